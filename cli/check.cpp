@@ -2,7 +2,9 @@
 
 #include <chrono>
 #include <memory>
+#include <utility>
 
+#include "cli/check_run.h"
 #include "cli/check_state.h"
 #include "cli/commands.h"
 #include "cli/findings.h"
@@ -18,6 +20,7 @@
 #include "harness/scene_judge.h"
 #include "model/io/array_file.h"
 #include "model/io/recording.h"
+#include "model/io/run_segments.h"
 #include "model/printable.h"
 
 namespace cutproof::cli {
@@ -83,13 +86,22 @@ int check_recording(const CheckOptions& options) {
 }
 
 int check(const CheckOptions& options) {
-  if (!io::is_array_file(options.recording)) return check_recording(options);
+  const bool has_segments = io::RunSegments::has_segments(options.recording);
+  if (!has_segments && !io::is_array_file(options.recording)) return check_recording(options);
   if (!options.report.empty()) {
-    refuse("--report", "a state in a file of arrays is a single moment, of which no page is made",
+    refuse("--report", "of a file of arrays no page is made",
            "leave it out; --json has every verdict with its witness");
   }
   depth_asked(options.depth);  // there is no motion to leave out, but a depth that is none is refused all the same
-  return check_state(options.recording, {options.json, options.junit, options.again});
+  const StateReports reports = {options.json, options.junit, options.again};
+  if (has_segments) {
+    io::RunSegments segments(options.recording);
+    return check_run(segments, options.recording, reports);
+  }
+  io::ArrayFile contents = io::read_array_file(options.recording);
+  if (!io::RunSegments::is_segment(contents)) return check_state(contents, options.recording, reports);
+  io::RunSegments segments(options.recording, std::move(contents));
+  return check_run(segments, options.recording, reports);
 }
 
 }  // namespace
@@ -97,8 +109,8 @@ int check(const CheckOptions& options) {
 void add_check(CLI::App& program, Work& work) {
   const auto options = std::make_shared<CheckOptions>();
   CLI::App* const command =
-      program.add_subcommand("check", "judge a recording, or a state of somebody else's simulator");
-  command->add_option("recording", options->recording, "what --record was given, or an NPZ or HDF5 file of arrays")
+      program.add_subcommand("check", "judge a recording, or a state or run of another simulator");
+  command->add_option("recording", options->recording, "what --record was given, an NPZ or HDF5 file, or a folder")
       ->required()
       ->type_name("RECORDING");
   add_check_depth(*command, options->depth, "how much is judged");

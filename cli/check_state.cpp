@@ -53,8 +53,8 @@ nlohmann::json to_json(const std::string& file, const harness::ForeignState& for
 
 }  // namespace
 
-int check_state(const std::string& file, const StateReports& reports) {
-  const harness::ForeignState foreign = harness::foreign_state_of(io::read_array_file(file), file);
+int check_state(const io::ArrayFile& contents, const std::string& file, const StateReports& reports) {
+  const harness::ForeignState foreign = harness::foreign_state_of(contents, file);
   require_writable(reports.json);
   require_writable(reports.junit);
   const harness::ForeignVerdicts judged = harness::judge_foreign_state(foreign);

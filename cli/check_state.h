@@ -2,6 +2,8 @@
 #pragma once
 #include <string>
 
+#include "model/io/array_file.h"
+
 namespace cutproof::cli {
 
 struct StateReports {
@@ -9,7 +11,7 @@ struct StateReports {
   std::string again;        // the command line
 };
 
-// Judges, prints, and writes what is asked for. Returns the exit status.
-int check_state(const std::string& file, const StateReports& reports);
+// Judges, prints, and writes what is asked for. `contents`: of the file. Returns the exit status.
+int check_state(const io::ArrayFile& contents, const std::string& file, const StateReports& reports);
 
 }  // namespace cutproof::cli

@@ -97,7 +97,7 @@ std::string plural(int64_t count, const char* one, const char* several) {
 bool is_expectation(const Row& row) { return row.any->property.starts_with(oracles::kExpectation); }
 
 std::string name_of_row(const Row& row, const Shown& shown) {
-  const bool has_stage = shown.in_frames && !is_expectation(row);
+  const bool has_stage = shown.in_frames && shown.in_stages && !is_expectation(row);
   return has_stage ? fmt::format("{} after {}", row.any->property, name_of(row.any->stage)) : row.any->property;
 }
 
@@ -146,14 +146,16 @@ void print_failing(const std::vector<Row>& rows, const Shown& shown) {
 // A row for each property and stage.
 void print_table(const std::vector<Row>& rows, const Shown& shown) {
   std::vector<std::string> head = {"property"};
-  if (shown.in_frames) head.insert(head.end(), {"after", "frames"});
+  if (shown.in_frames && shown.in_stages) head.push_back("after");
+  if (shown.in_frames) head.push_back("frames");
   head.insert(head.end(), {"checked", "failed", "worst", "bound", "unit", "of bound"});
   Table table(head);
   for (const Row& row : rows) {
     const Verdict& worst = *row.worst;
     const std::string failed = row.failed + row.expected == 0 ? "-" : fmt::format("{}", row.failed + row.expected);
     std::vector<std::string> cells = {worst.property};
-    if (shown.in_frames) cells.insert(cells.end(), {std::string(name_of(worst.stage)), fmt::format("{}", row.looked)});
+    if (shown.in_frames && shown.in_stages) cells.emplace_back(name_of(worst.stage));
+    if (shown.in_frames) cells.push_back(fmt::format("{}", row.looked));
     cells.insert(
         cells.end(),
         {short_figure(static_cast<double>(row.checked)), row.failed > 0 ? failing(failed) : failed,

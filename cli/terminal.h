@@ -20,6 +20,7 @@ struct Shown {
   bool in_frames = true;  // of a run; else of no run, without stages and frames
   // Where given, which properties have a share of their bound, and how much: a verdict on a run as a whole has none.
   const harness::PropertySummaries* summaries = nullptr;
+  bool in_stages = true;  // of frames that have stages
 };
 
 // What fails, by property and stage: how often, and the first of them with its frame, its figures and its witness. Then

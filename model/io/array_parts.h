@@ -51,6 +51,10 @@ class ArrayCollector {
 // Of a file that is known to begin as such a file does.
 ArrayFile read_npz(const std::string& path);
 ArrayFile read_hdf5_arrays(const std::string& path);
+// Of a run (run_segments.h): the names of its segments, ascending, and one of them; `with_root`: with what lies beside.
+bool is_segment_name(const std::string& name);
+std::vector<std::string> hdf5_segments(const std::string& path);
+ArrayFile read_hdf5_segment(const std::string& path, const std::string& segment, bool with_root);
 void write_npz(const std::string& path, const ArrayFile& contents);
 void write_hdf5_arrays(const std::string& path, const ArrayFile& contents);
 

@@ -1,6 +1,8 @@
 // Arrays in HDF5: a flat group of datasets.
 #include <fmt/format.h>
 
+#include <functional>
+
 #include "model/at.h"
 #include "model/io/array_parts.h"
 #include "model/io/atomic_file.h"
@@ -47,10 +49,12 @@ void collect_attribute(const hdf5::File& file, hid_t root, const std::string& na
   found.add(name, texts, true);
 }
 
-void collect(const hdf5::File& file, const std::string& path, ArrayCollector& found) {
-  const hdf5::Id root = hdf5::open_group(file.id(), "/");
-  for (const std::string& name : hdf5::names_in(root.get(), kMostArrays)) {
-    const hdf5::Values values = hdf5::Values::of_dataset(root.get(), name, kMostArrayBytes, file.bytes());
+// The datasets of one group; `without`: names that are passed over.
+void collect(const hdf5::File& file, const std::string& path, const hdf5::Id& group, std::size_t most,
+             const std::function<bool(const std::string&)>& without, ArrayCollector& found) {
+  for (const std::string& name : hdf5::names_in(group.get(), most)) {
+    if (without && without(name)) continue;
+    const hdf5::Values values = hdf5::Values::of_dataset(group.get(), name, kMostArrayBytes, file.bytes());
     if (values.kind() == hdf5::ValueKind::real && values.bytes_each() == 2) refuse_half_precision(path, name);
     found.announce(name, values.bytes());
     if (values.kind() == hdf5::ValueKind::text) {
@@ -67,8 +71,21 @@ void collect(const hdf5::File& file, const std::string& path, ArrayCollector& fo
       found.add(name, std::move(raw));
     }
   }
+}
+void collect_attributes(const hdf5::File& file, const hdf5::Id& root, ArrayCollector& found) {
   for (const std::string& name : hdf5::attribute_names(root.get(), kMostArrays)) {
     collect_attribute(file, root.get(), name, found);
+  }
+}
+
+// Calls read(file) with HDF5's errors as those of the input.
+template <class Read>
+void read_file(const std::string& path, const Read& read) {
+  const hdf5::Quiet quiet;
+  try {
+    read(hdf5::File::open(path));
+  } catch (const hdf5::Error& error) {
+    throw InputError(path, error.where() == path ? "" : error.where(), error.what(), kArraysRemedy);
   }
 }
 
@@ -83,13 +100,36 @@ hdf5::Layout layout_of(const Array& array) {
 }  // namespace
 
 ArrayFile read_hdf5_arrays(const std::string& path) {
-  const hdf5::Quiet quiet;
   ArrayCollector found(path, require_regular_file(path));
-  try {
-    collect(hdf5::File::open(path), path, found);
-  } catch (const hdf5::Error& error) {
-    throw InputError(path, error.where() == path ? "" : error.where(), error.what(), kArraysRemedy);
-  }
+  read_file(path, [&](const hdf5::File& file) {
+    const hdf5::Id root = hdf5::open_group(file.id(), "/");
+    collect(file, path, root, kMostArrays, {}, found);
+    collect_attributes(file, root, found);
+  });
+  return found.take();
+}
+
+std::vector<std::string> hdf5_segments(const std::string& path) {
+  std::vector<std::string> names;
+  read_file(path, [&](const hdf5::File& file) {
+    for (std::string& name : hdf5::names_in(hdf5::open_group(file.id(), "/").get(), kMostSegments)) {
+      if (is_segment_name(name)) names.push_back(std::move(name));
+    }
+  });
+  return names;
+}
+
+ArrayFile read_hdf5_segment(const std::string& path, const std::string& segment, bool with_root) {
+  ArrayCollector found(path, require_regular_file(path));
+  read_file(path, [&](const hdf5::File& file) {
+    const hdf5::Id root = hdf5::open_group(file.id(), "/");
+    if (with_root) {
+      const auto is_other = [](const std::string& name) { return is_segment_name(name) || name.ends_with(".part"); };
+      collect(file, path, root, kMostSegments, is_other, found);
+      collect_attributes(file, root, found);
+    }
+    collect(file, path, hdf5::open_group(root.get(), segment), kMostArrays, {}, found);
+  });
   return found.take();
 }
 

@@ -100,6 +100,7 @@ std::string limits_reference() {
               fmt::format("{}, {}", kMostArrays, kMostArrayAxes));
   text += row("", "bytes of all arrays in memory, of a text",
               fmt::format("{}, {}", bytes_text(kMostArrayBytes), bytes_text(kMostTextBytes)));
+  text += row("A run (`check`)", "segments, each with the arrays of one file", count_text(kMostSegments));
   text +=
       row("A recording (`check`, `digest`, `report`)", "snapshots", count_text(static_cast<uint64_t>(kMostSnapshots)));
   text += row("What is compressed", "bytes that it may become in any case", bytes_text(kFreeInflation));

@@ -55,6 +55,9 @@ inline constexpr std::size_t kMostArrays = 64;
 inline constexpr std::size_t kMostArrayAxes = 8;
 inline constexpr std::size_t kMostTextBytes = std::size_t{1} << 15;
 
+// Of a run of another simulator.
+inline constexpr std::size_t kMostSegments = 1'000'000;
+
 // Of a recording.
 inline constexpr int64_t kMostSnapshots = 1'000'000;
 

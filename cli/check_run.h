@@ -1,0 +1,12 @@
+// `cutproof check` of a run of somebody else's simulator.
+#pragma once
+#include "cli/check_state.h"
+#include "model/io/run_segments.h"
+
+namespace cutproof::cli {
+
+// Returns the exit status: 0 if what was judged holds, 1 otherwise. Throws InputError if a segment cannot be
+// understood.
+int check_run(io::RunSegments& segments, const std::string& file, const StateReports& reports);
+
+}  // namespace cutproof::cli

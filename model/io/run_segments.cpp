@@ -1,0 +1,75 @@
+#include "model/io/run_segments.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include "model/error.h"
+#include "model/io/array_parts.h"
+
+namespace cutproof::io {
+
+bool is_segment_name(const std::string& name) {
+  return name.size() == 6 && std::all_of(name.begin(), name.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+namespace {
+
+// The number that a file of a series ends in, as in run_000012.npz; "" if it is none of a series.
+std::string number_of(const std::filesystem::path& file) {
+  const std::string stem = file.stem().string();
+  if (file.extension() != ".npz" || stem.size() < 6) return "";
+  const std::string number = stem.substr(stem.size() - 6);
+  return is_segment_name(number) ? number : "";
+}
+
+std::vector<std::string> files_in(const std::string& folder) {
+  std::vector<std::string> files;
+  std::error_code failed;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, failed)) {
+    if (!number_of(entry.path()).empty()) files.push_back(entry.path().string());
+  }
+  if (failed) throw InputError(folder, "", "The folder cannot be read.", "Check its permissions.");
+  if (files.size() > kMostSegments) throw InputError(folder, "", "There are too many files.", "Write longer segments.");
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+}  // namespace
+
+bool RunSegments::has_segments(const std::string& path) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) return true;
+  if (path.ends_with(".npz") || !is_array_file(path)) return false;
+  try {
+    return !hdf5_segments(path).empty();
+  } catch (const InputError&) {
+    return false;  // whoever reads it says what is wrong
+  }
+}
+
+bool RunSegments::is_segment(const ArrayFile& contents) {
+  const Array* const positions = find_array(contents.arrays, "positions");
+  return positions != nullptr && positions->shape.size() == 3 && find_array(contents.arrays, "kicked") == nullptr;
+}
+
+RunSegments::RunSegments(std::string path) : path_(std::move(path)), source_(path_) {
+  std::error_code ignored;
+  is_folder_ = std::filesystem::is_directory(path_, ignored);
+  names_ = is_folder_ ? files_in(path_) : hdf5_segments(path_);
+  if (names_.empty()) {
+    throw InputError(path_, "", "This folder has no file of a run.", "Write 000000.npz, 000001.npz, … into it.");
+  }
+}
+
+std::optional<ArrayFile> RunSegments::next() {
+  if (only_) return std::exchange(only_, std::nullopt);
+  if (next_ == names_.size()) return std::nullopt;
+  const std::string& name = names_[next_];
+  const bool is_first = next_++ == 0;
+  source_ = is_folder_ ? name : path_ + "/" + name;
+  return is_folder_ ? read_array_file(name) : read_hdf5_segment(path_, name, is_first);
+}
+
+}  // namespace cutproof::io

@@ -1,0 +1,661 @@
+#include "oracles/runs/run_judge.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "model/at.h"
+#include "oracles/rounding.h"
+#include "oracles/runs/cells.h"
+#include "oracles/runs/pieces.h"
+#include "oracles/support.h"
+
+namespace cutproof::oracles {
+namespace {
+
+constexpr const char* kSource = "tolerances.md, Runs";
+enum Which : std::size_t {
+  kForm,
+  kFinite,
+  kGone,
+  kTeleport,
+  kSomethingCut,
+  kAcross,
+  kWithin,
+  kSaid,
+  kMomentum,
+  kCentre,
+  kAngular,
+  kEnergy,
+  kInverted,
+  kTissue,
+  kMass,
+  kProperties
+};
+
+// An explicit method is stable only while its forces change velocities by no more than so many times what moved
+// divided by the substep (dt² k / m <= 4); more than that is not there to be rounded.
+constexpr double kStable = 4;
+// How much farther than from each other velocities at both ends of a frame may be from those in between.
+constexpr double kBetween = 2;
+
+bool is_number(Vec3 x) { return std::isfinite(x.x) && std::isfinite(x.y) && std::isfinite(x.z); }
+bool is_blank(Vec3 x) { return std::isnan(x.x) && std::isnan(x.y) && std::isnan(x.z); }
+
+}  // namespace
+
+const std::vector<RunProperty>& run_properties() {
+  static const std::vector<RunProperty> all = {
+      {"run well formed", "1", "docs/reference/run.md", "nothing"},
+      {"finite", "1", kSource, "nothing"},
+      {"what is gone stays gone", "1", kSource, "nothing"},
+      {"no teleport", "m", kSource, "velocities and time"},
+      {"something was cut", "1", kSource, "a blade, and tissue: edges, cells, nodes, or rest and spacing"},
+      {"no coupling across pieces", "1", kSource, "coupling groups or cells, and tissue"},
+      {"pieces coupled within", "1", kSource, "coupling groups or cells, tissue and a blade"},
+      {"pieces as said", "1", kSource, "piece and tissue"},
+      {"linear momentum", "kg m/s", kSource, "velocities, mass, time, and contact_impulse or the promise 'free'"},
+      {"centre of mass", "m", kSource, "velocities, mass, time, and contact_impulse or the promise 'free'"},
+      {"angular momentum", "kg m²/s", kSource, "the promise 'angular_momentum', velocities, mass and time"},
+      {"energy", "J", kSource, "the promise 'energy', and energy"},
+      {"no inverted cell", "1", kSource, "cells"},
+      {"tissue kept", "1", kSource, "cells and rest"},
+      {"mass kept", "kg", kSource, "mass that is given anew"},
+  };
+  return all;
+}
+
+class RunJudge::Implementation {
+ public:
+  explicit Implementation(RunHeader header) : header_(std::move(header)), found_(kProperties) {
+    for (std::size_t k = 0; k < kProperties; ++k) found_[k].verdict = fresh(static_cast<Which>(k));
+    found_[kForm].verdict.checked = 1;
+  }
+
+  void couple(RunCoupling coupling) {
+    coupling_ = std::move(coupling);
+    const bool has_groups = coupling_.offsets.size() > 1;
+    if (has_groups && (coupling_.offsets.front() != 0 || coupling_.offsets.back() != std::ssize(coupling_.members) ||
+                       !std::is_sorted(coupling_.offsets.begin(), coupling_.offsets.end()))) {
+      fail(kForm, {}, "groups_offsets do not begin at 0, ascend and end at {} members", coupling_.members.size());
+      coupling_ = {};
+    }
+    is_coupled_ = has_groups || coupling_.corners > 0;
+    is_new_coupling_ = true;
+  }
+
+  void weigh(std::vector<double> mass) {
+    mass_ = std::move(mass);
+    is_new_mass_ = true;
+  }
+
+  void see(const RunFrame& frame) {
+    if (!holds(kForm) || !holds(kFinite)) return;  // nothing else means anything
+    frame_ = frame.index;
+    ++frames_;
+    n_ = std::ssize(frame.positions);
+    const auto sized = [&](std::ptrdiff_t size) { return size == 0 || size == n_; };
+    if (n_ < std::ssize(was_) || !sized(std::ssize(frame.velocities)) || !sized(std::ssize(frame.alive))) {
+      fail(kForm, {}, "frame {} has {} particles, and the one before has {}", frame_, n_, was_.size());
+      return;
+    }
+    if (is_new_coupling_ && !check_members()) return;
+    find_existing(frame);
+    check_finite(frame);
+    if (!holds(kFinite) || !holds(kForm)) return;
+    if (!tissue_) {
+      lay_tissue();
+      if (tissue_) pieces_at_first_ = tissue_->apart().count;
+    }
+    if (!was_.empty()) {
+      teleport(frame);
+      momenta(frame);
+    }
+    for (std::size_t i = parent_.size(); i < frame.parent.size(); ++i) parent_.push_back(frame.parent[i]);
+    parent_.resize(at(n_), -1);
+    masses();
+    energy(frame);
+    cells(frame);
+    cut(frame);
+    if (is_coupled_ && tissue_ && (is_new_coupling_ || !frame.blade.empty() || is_new_gone_)) partitions();
+    if (!frame.piece.empty()) said(frame);
+    is_new_coupling_ = is_new_gone_ = is_new_mass_ = false;
+    was_.assign(frame.positions.begin(), frame.positions.end());
+    velocity_was_.assign(frame.velocities.begin(), frame.velocities.end());
+    spin_was_.assign(frame.spin.begin(), frame.spin.end());
+    existed_ = exists_;
+    time_was_ = frame.time;
+  }
+
+  void finish() {
+    if (frames_ == 0) fail(kForm, {}, "the run has no frames");
+    // Where no blade was ever shown, nobody knows what it may have parted.
+    if (!has_blade_) found_[kWithin].verdict = fresh(kWithin);
+    if (has_blade_ && tissue_) {
+      Verdict& verdict = found_[kSomethingCut].verdict;
+      verdict.checked = 1;
+      // What the blade takes away parts tissue, too.
+      const bool is_cut = tissue_->surely_cut() > 0 || tissue_->apart().count > pieces_at_first_;
+      verdict.measured = is_cut ? 0 : 1;
+      if (!is_cut)
+        fail(kSomethingCut, {}, "the blade has surely cut no edge of the tissue, and perhaps {}: nothing was tested",
+             tissue_->perhaps_cut());
+    }
+    if (!found_[kAngular].verdict.checked && lost_ > 0) {
+      notes_.push_back(
+          fmt::format("The run loses up to {:.2g} of its angular momentum in a frame (frame {}). A scheme "
+                      "may do so; promise 'angular_momentum' if yours must not.",
+                      lost_, lost_at_));
+    }
+  }
+
+  std::vector<Verdict> verdicts() const {
+    std::vector<Verdict> all;
+    for (const Found& found : found_) {
+      if (found.verdict.checked > 0 || !found.verdict.holds) all.push_back(found.verdict);
+    }
+    return all;
+  }
+  std::vector<NotAsked> not_asked() const {
+    std::vector<NotAsked> all;
+    for (std::size_t k = 0; k < kProperties; ++k) {
+      const Verdict& verdict = found_[k].verdict;
+      if (verdict.checked > 0 || !verdict.holds) continue;
+      const bool is_stopped = !holds(kForm) || !holds(kFinite);
+      all.push_back({verdict.property, is_stopped               ? "the run is not well formed, or not finite"
+                                       : !found_[k].why.empty() ? found_[k].why
+                                                                : "needs " + std::string(run_properties()[k].needs)});
+    }
+    return all;
+  }
+  const std::vector<std::string>& notes() const { return notes_; }
+  RunPieces pieces() const {
+    RunPieces made;
+    if (!tissue_) return made;
+    const SweptTissue::Pieces apart = tissue_->apart(), together = tissue_->together();
+    made.units = std::ssize(apart.label);
+    made.pieces = apart.count;
+    made.at_most = together.count;
+    made.sizes.resize(at(apart.count));
+    for (const int32_t label : apart.label) {
+      if (label >= 0) ++made.sizes[at(label)];
+    }
+    std::sort(made.sizes.rbegin(), made.sizes.rend());
+    made.surely_cut = tissue_->surely_cut();
+    made.perhaps_cut = tissue_->perhaps_cut();
+    for (int32_t k = 0; k < made.units; ++k) made.beside += tissue_->is_beside(k);
+    made.coupled = coupled_count_;
+    return made;
+  }
+
+ private:
+  struct Found {
+    Verdict verdict;
+    double nearest = -1;  // measured / bound
+    std::string why;      // it was not asked
+  };
+
+  static Verdict fresh(Which which) {
+    const RunProperty& property = run_properties()[which];
+    Verdict verdict;
+    verdict.property = property.name;
+    verdict.unit = property.unit;
+    verdict.bound_source = property.source;
+    return verdict;
+  }
+  bool holds(Which which) const { return found_[which].verdict.holds; }
+  template <class... Args>
+  void fail(Which which, Concerned concerned, fmt::format_string<Readable<Args>...> text, Args&&... args) {
+    Verdict& verdict = found_[which].verdict;
+    if (!verdict.holds) return;
+    verdict.holds = false;
+    verdict.frame = frame_;
+    verdict.witness = witness_of<Args...>(std::move(concerned), text, std::forward<Args>(args)...);
+  }
+  // Whether a comparison is within its bound; the first that is not is kept, or else that which comes nearest.
+  bool within(Which which, double measured, double bound) {
+    Found& found = found_[which];
+    ++found.verdict.checked;
+    const bool is_first_failure = !found.verdict.holds && found.verdict.frame == frame_ && std::isfinite(found.nearest);
+    if (!found.verdict.holds && !is_first_failure) return true;
+    const bool is_within = measured <= bound;
+    const double ratio = is_within ? (bound > 0 ? measured / bound : 0) : std::numeric_limits<double>::infinity();
+    if (ratio > found.nearest) {
+      found.nearest = ratio;
+      found.verdict.measured = measured;
+      found.verdict.bound = bound;
+      found.verdict.frame = frame_;
+    }
+    return is_within;
+  }
+
+  bool check_members() {
+    const auto wrong = [&](const std::vector<int32_t>& members) {
+      return std::find_if(members.begin(), members.end(), [&](int32_t i) { return i < 0 || i >= n_; });
+    };
+    if (const auto bad = wrong(coupling_.members); bad != coupling_.members.end()) {
+      fail(kForm, {}, "a group has particle {} of {}", *bad, n_);
+      return false;
+    }
+    if (const auto bad = wrong(coupling_.cells); bad != coupling_.cells.end()) {
+      fail(kForm, {}, "a cell has particle {} of {}", *bad, n_);
+      return false;
+    }
+    return true;
+  }
+
+  void find_existing(const RunFrame& frame) {
+    exists_.assign(at(n_), 1);
+    for (std::size_t i = 0; i < exists_.size(); ++i) {
+      if (is_blank(frame.positions[i]) || (!frame.alive.empty() && frame.alive[i] == 0) ||
+          (!frame.removed.empty() && frame.removed[i] != 0)) {
+        exists_[i] = 0;
+      }
+    }
+    ever_.resize(exists_.size());
+    int64_t revived = 0;
+    for (std::size_t i = 0; i < exists_.size(); ++i) {
+      const bool existed = i < existed_.size() && existed_[i] != 0;
+      if (exists_[i] != 0 && !existed && ever_[i] != 0) {
+        ++revived;
+        fail(kGone, {{}, {static_cast<int32_t>(i)}}, "particle {} was gone, and is there again in frame {}", i, frame_);
+      }
+      if (exists_[i] == 0 && existed) is_new_gone_ = true;
+      ever_[i] |= exists_[i];
+    }
+    if (frames_ > 1) within(kGone, static_cast<double>(revived), 0);
+  }
+
+  void check_finite(const RunFrame& frame) {
+    int64_t wrong = 0;
+    for (std::size_t i = 0; i < exists_.size(); ++i) {
+      if (exists_[i] == 0) continue;
+      const bool fine = is_number(frame.positions[i]) && (frame.velocities.empty() || is_number(frame.velocities[i]));
+      if (fine) continue;
+      ++wrong;
+      fail(kFinite, {{}, {static_cast<int32_t>(i)}}, "the {} of particle {} is not a number in frame {}",
+           is_number(frame.positions[i]) ? "velocity" : "position", i, frame_);
+    }
+    within(kFinite, static_cast<double>(wrong), 0);
+  }
+
+  // Units of tissue are cells where there are cells.
+  bool by_cells() const { return unit_corners_ > 0; }
+  int32_t unit_particle(int32_t unit) const {
+    return by_cells() ? coupling_.cells[at(unit) * at(unit_corners_)] : unit;
+  }
+  Vec3 place_of(std::span<const Vec3> x, int32_t unit) const {
+    if (!by_cells()) return x[at(unit)];
+    Vec3 sum;
+    for (int k = 0; k < unit_corners_; ++k) sum += x[at(coupling_.cells[at(unit) * at(unit_corners_) + at(k)])];
+    return sum / static_cast<double>(unit_corners_);
+  }
+
+  void lay_tissue() {
+    if (coupling_.corners > 0) {
+      unit_corners_ = coupling_.corners;
+      units_ = static_cast<int32_t>(std::ssize(coupling_.cells) / unit_corners_);
+      tissue_.emplace(units_, tissue_of_cells(coupling_.cells, unit_corners_));
+      return;
+    }
+    units_ = static_cast<int32_t>(n_);
+    if (!header_.edges.empty()) {
+      for (const auto& [a, b] : header_.edges) {
+        if (a < 0 || b < 0 || a >= n_ || b >= n_) return fail(kForm, {}, "an edge joins {} and {} of {}", a, b, n_);
+      }
+      tissue_.emplace(units_, header_.edges);
+      return;
+    }
+    const std::span<const Vec3> rest = header_.rest.empty() ? std::span<const Vec3>() : std::span(header_.rest);
+    if (std::ssize(rest) != n_ || !(header_.spacing > 0)) return;
+    tissue_.emplace(units_, tissue_at_rest(rest, header_.spacing));
+  }
+
+  // Each particle goes where its velocity takes it: nothing may jump.
+  void teleport(const RunFrame& frame) {
+    if (frame.velocities.empty() || velocity_was_.empty() || !frame.time || !time_was_) return;
+    const double dt = *frame.time - *time_was_;
+    if (!(dt > 0)) return fail(kForm, {}, "time does not ascend: {} s after {} s", *frame.time, *time_was_);
+    double change = 0, farthest = 0;
+    for (std::size_t i = 0; i < was_.size(); ++i) {
+      if (exists_[i] == 0 || existed_[i] == 0) continue;
+      change = std::max(change, norm(frame.velocities[i] - velocity_was_[i]));
+      farthest = std::max({farthest, norm(was_[i]), norm(frame.positions[i])});
+    }
+    const double bound = kBetween * dt * change + 4 * header_.u * static_cast<double>(header_.steps) * farthest +
+                         (header_.promised(RunPromise::free) ? 0 : sweep_reach(frame)) + header_.cut_resolution;
+    for (std::size_t i = 0; i < was_.size(); ++i) {
+      if (exists_[i] == 0 || existed_[i] == 0 || (!frame.held.empty() && frame.held[i] != 0)) continue;
+      const Vec3 mean = 0.5 * (frame.velocities[i] + velocity_was_[i]);
+      const double off = norm(frame.positions[i] - was_[i] - dt * mean);
+      if (!within(kTeleport, off, bound))
+        fail(kTeleport, {{}, {static_cast<int32_t>(i)}},
+             "particle {} is {:.3g} m from where its velocity takes it in frame {}, in which no velocity changes by "
+             "more "
+             "than {:.3g} m/s",
+             i, off, frame_, change);
+    }
+  }
+  // How far a blade may have pushed something out of its way: as far as it sweeps in this frame.
+  static double sweep_reach(const RunFrame& frame) {
+    double reach = 0;
+    for (std::size_t k = 0; k + 4 <= frame.blade.size(); k += 4) {
+      for (std::size_t side = 0; side < 4; ++side) {
+        const double length = norm(frame.blade[k + side] - frame.blade[k + (side + 1) % 4]);
+        if (std::isfinite(length)) reach = std::max(reach, length);
+      }
+    }
+    return reach;
+  }
+
+  // Sums over all that exists: momentum, its centre, its angular momentum about that.
+  void momenta(const RunFrame& frame) {
+    if (frame.velocities.empty() || velocity_was_.empty() || !frame.time || !time_was_) return;
+    if (std::ssize(mass_) < n_ || exists_.size() != existed_.size() || exists_ != existed_) {
+      found_[kMomentum].why = found_[kCentre].why = "mass is not given of all, or particles come and go in every frame";
+      return;
+    }
+    const bool is_held = std::any_of(frame.held.begin(), frame.held.end(), [](uint8_t held) { return held != 0; });
+    const bool is_free = header_.promised(RunPromise::free);
+    if (!is_free && !frame.contact_impulse) return;
+    if (is_held && !frame.contact_impulse) return;
+    const double dt = *frame.time - *time_was_, dt_s = dt / static_cast<double>(header_.steps);
+    const Vec3 gravity = header_.gravity.value_or(Vec3{}), impulse = frame.contact_impulse.value_or(Vec3{});
+    double mass = 0, size = 0, squares = 0, farthest = 0;
+    Vec3 p, p_was, x, x_was;
+    for (std::size_t i = 0; i < exists_.size(); ++i) {
+      if (exists_[i] != 0) farthest = std::max({farthest, norm(frame.positions[i]), norm(was_[i])});
+    }
+    for (std::size_t i = 0; i < exists_.size(); ++i) {
+      if (exists_[i] == 0) continue;
+      const double m = mass_[i];
+      mass += m;
+      p += m * frame.velocities[i];
+      p_was += m * velocity_was_[i];
+      x += m * frame.positions[i];
+      x_was += m * was_[i];
+      const double rounds = norm(frame.velocities[i]) + norm(velocity_was_[i]) + kStable * farthest / dt_s;
+      size += m * rounds;
+      squares += m * rounds * m * rounds;
+    }
+    const double steps = static_cast<double>(header_.steps), decay = header_.damping * dt;
+    const double rounding = kDeviations * header_.u * std::sqrt(steps * squares);
+    // Schemes differ in how they damp, by the square of c dt.
+    const double pushed = norm(impulse) + mass * norm(gravity) * dt + norm(p_was);
+    const Vec3 expected =
+        std::exp(-decay) * p_was + (decay > 0 ? -std::expm1(-decay) / decay : 1) * (mass * dt * gravity) + impulse;
+    const double slack = (decay + decay * decay) * (norm(impulse) + mass * norm(gravity) * dt);
+    const double off = norm(p - expected);
+    if (!within(kMomentum, off, rounding + slack + 4 * header_.u * pushed))
+      fail(kMomentum, {}, "momentum changes by {:.3g} kg m/s in frame {} more than gravity and contacts explain", off,
+           frame_);
+    if (norm(impulse) == 0 && !is_held && (is_free || frame.blade.empty())) {
+      // The mean velocity of the frame lies between those of its ends; half a substep of gravity either way.
+      const Vec3 middle = 0.5 * (p + p_was);
+      const double way = norm((x - x_was) - dt * middle) / mass;
+      const double between = 0.5 * dt * norm(p - p_was) / mass;
+      const double places = kDeviations * header_.u * std::sqrt(steps) * farthest;
+      if (!within(kCentre, way, between + places + dt * rounding / mass))
+        fail(kCentre, {}, "the centre of mass is {:.3g} m from where its velocity takes it in frame {}", way, frame_);
+      angular(frame, x / mass, x_was / mass, p / mass, p_was / mass, rounding, farthest);
+    }
+  }
+
+  void angular(const RunFrame& frame, Vec3 x, Vec3 x_was, Vec3 v, Vec3 v_was, double rounding, double farthest) {
+    Vec3 spins, spins_was;
+    double size = 0;
+    for (std::size_t i = 0; i < exists_.size(); ++i) {
+      if (exists_[i] == 0) continue;
+      const double m = mass_[i];
+      const Vec3 arm = frame.positions[i] - x, was = was_[i] - x_was;
+      spins += m * cross(arm, frame.velocities[i] - v);
+      spins_was += m * cross(was, velocity_was_[i] - v_was);
+      if (!frame.spin.empty()) spins += frame.spin[i];
+      if (!spin_was_.empty()) spins_was += spin_was_[i];
+      size += m * norm(arm) * norm(frame.velocities[i] - v);
+    }
+    const double off = norm(spins - spins_was);
+    if (header_.promised(RunPromise::angular_momentum)) {
+      const double decay = header_.damping * *frame.time - header_.damping * *time_was_;
+      if (!within(kAngular, off,
+                  2 * farthest * rounding + kDeviations * header_.u * size + 2 * decay * norm(spins_was)))
+        fail(kAngular, {}, "angular momentum changes from {:.4g} to {:.4g} kg m²/s in frame {}, where nothing pushes",
+             norm(spins_was), norm(spins), frame_);
+    } else if (norm(spins_was) > 1e3 * (2 * farthest * rounding) && off / norm(spins_was) > lost_) {
+      lost_ = off / norm(spins_was);
+      lost_at_ = frame_;
+    }
+  }
+
+  // Vertices that are split share the mass of the one that they come from.
+  void masses() {
+    if (!is_new_mass_ || std::ssize(mass_) != n_) return;
+    double mass = 0;
+    for (const double m : mass_) mass += m;
+    if (mass_was_) {
+      const double off = std::abs(mass - *mass_was_);
+      if (!within(kMass, off, kDeviations * header_.u * std::sqrt(static_cast<double>(n_)) * *mass_was_))
+        fail(kMass, {}, "there are {:.6g} kg in frame {}, and there were {:.6g}", mass, frame_, *mass_was_);
+    }
+    mass_was_ = mass;
+  }
+
+  void energy(const RunFrame& frame) {
+    if (!header_.promised(RunPromise::energy) || !frame.energy) return;
+    const bool is_pushed = (frame.contact_impulse && norm(*frame.contact_impulse) > 0) || !frame.blade.empty() ||
+                           std::any_of(frame.held.begin(), frame.held.end(), [](uint8_t held) { return held != 0; });
+    if (energy_was_ && !is_pushed) {
+      const double grown = *frame.energy - *energy_was_;
+      const double bound = kDeviations * header_.u * std::sqrt(static_cast<double>(header_.steps * n_)) *
+                           (std::abs(*energy_was_) + std::abs(*frame.energy));
+      if (!within(kEnergy, std::max(0.0, grown), bound))
+        fail(kEnergy, {}, "energy grows from {:.6g} to {:.6g} J in frame {}, where nothing pushes", *energy_was_,
+             *frame.energy, frame_);
+    }
+    energy_was_ = frame.energy;
+  }
+
+  void cells(const RunFrame& frame) {
+    const int corners = coupling_.corners;
+    if (corners == 0) return;
+    const std::size_t count = coupling_.cells.size() / at(corners);
+    int64_t inverted = 0;
+    double volume = 0;
+    Vec3 x[8], rest[8];
+    const bool weighs = is_new_coupling_ && !header_.rest.empty();
+    for (std::size_t cell = 0; cell < count; ++cell) {
+      bool exists = true, has_rest = weighs;
+      for (std::size_t k = 0; k < at(corners); ++k) {
+        const int32_t i = coupling_.cells[cell * at(corners) + k];
+        x[k] = frame.positions[at(i)];
+        exists &= exists_[at(i)] != 0;
+        const int32_t of = rest_of(i);
+        has_rest &= of >= 0;
+        if (has_rest) rest[k] = header_.rest[at(of)];
+      }
+      if (!exists) continue;
+      if (has_rest) volume += size_of(rest, corners);
+      if (!is_inverted(x, corners)) continue;
+      ++inverted;
+      const int32_t first = coupling_.cells[cell * at(corners)];
+      fail(kInverted, {{}, {first}}, "cell {} at particle {} is inverted in frame {}", cell, first, frame_);
+    }
+    within(kInverted, static_cast<double>(inverted), 0);
+    if (!weighs) return;
+    if (!volume_at_rest_) volume_at_rest_ = volume;
+    const double lost = std::abs(volume - *volume_at_rest_) / std::abs(*volume_at_rest_);
+    if (!within(kTissue, lost, kDeviations * header_.u * static_cast<double>(count)))
+      fail(kTissue, {}, "cells have {:.6g} m³ at rest in frame {}, and had {:.6g}", volume, frame_, *volume_at_rest_);
+  }
+  // Whose place at rest a vertex has: its own, or that of the one that it was split from; -1: nobody knows.
+  int32_t rest_of(int32_t i) const {
+    const int64_t known = std::ssize(header_.rest);
+    while (i >= known && at(i) < parent_.size() && parent_[at(i)] >= 0 && parent_[at(i)] < i) i = parent_[at(i)];
+    return i < known ? i : -1;
+  }
+
+  void cut(const RunFrame& frame) {
+    has_blade_ |= !frame.blade.empty();
+    if (!tissue_ || (by_cells() && std::ssize(coupling_.cells) != int64_t{units_} * unit_corners_)) {
+      if (tissue_) found_[kAcross].why = found_[kWithin].why = "the number of cells changes";
+      tissue_.reset();
+      return;
+    }
+    for (int32_t unit = 0; unit < units_; ++unit) {
+      bool exists = exists_[at(unit_particle(unit))] != 0;
+      for (int k = 1; k < unit_corners_; ++k)
+        exists &= exists_[at(coupling_.cells[at(unit) * at(unit_corners_) + at(k)])] != 0;
+      if (!exists) tissue_->remove(unit);
+    }
+    if (!frame.blade.empty() && !was_places_.empty()) {
+      std::vector<Vec3> is = places(frame.positions);
+      double farthest = 0;
+      for (const Vec3 x : is) farthest = std::max(farthest, norm(x));
+      tissue_->sweep(frame.blade, was_places_, is, header_.cut_resolution + 8 * header_.u * farthest);
+      was_places_ = std::move(is);
+      return;
+    }
+    was_places_ = places(frame.positions);
+  }
+  std::vector<Vec3> places(std::span<const Vec3> x) const {
+    std::vector<Vec3> all;
+    for (int32_t unit = 0; unit < units_; ++unit) {
+      const Vec3 place = place_of(x, unit);
+      all.push_back(is_number(place) ? place : Vec3{});
+    }
+    return all;
+  }
+
+  // Components of the coupling, by particle.
+  std::vector<int32_t> coupled() {
+    DisjointSets sets(n_);
+    const auto join = [&](std::span<const int32_t> members, std::span<const double> weights) {
+      int32_t first = -1;
+      for (std::size_t k = 0; k < members.size(); ++k) {
+        const int32_t i = members[k];
+        if (exists_[at(i)] == 0 || (!weights.empty() && !(weights[k] > header_.u))) continue;
+        if (first >= 0) sets.unite(first, i);
+        first = i;
+      }
+    };
+    const auto weights = std::span(coupling_.weights);
+    for (std::size_t g = 0; g + 1 < coupling_.offsets.size(); ++g) {
+      const auto begin = at(coupling_.offsets[g]), count = at(coupling_.offsets[g + 1]) - begin;
+      join(std::span(coupling_.members).subspan(begin, count),
+           weights.empty() ? weights : weights.subspan(begin, count));
+    }
+    for (std::size_t begin = 0; coupling_.corners > 0 && begin < coupling_.cells.size(); begin += at(coupling_.corners))
+      join(std::span(coupling_.cells).subspan(begin, at(coupling_.corners)), {});
+    std::vector<int32_t> label(at(n_));
+    coupled_count_ = 0;
+    for (int32_t i = 0; i < n_; ++i) {
+      label[at(i)] = sets.find(i);
+      coupled_count_ += exists_[at(i)] != 0 && label[at(i)] == i;
+    }
+    return label;
+  }
+
+  void partitions() {
+    const std::vector<int32_t> label = coupled();
+    const SweptTissue::Pieces apart = tissue_->apart();
+    std::map<int32_t, int32_t> piece_of, unit_of;  // of a component of the coupling: the piece of a unit in it
+    int64_t across = 0;
+    for (int32_t unit = 0; unit < units_; ++unit) {
+      const int32_t piece = apart.label[at(unit)];
+      if (piece < 0 || tissue_->is_beside(unit)) continue;
+      const int32_t component = label[at(unit_particle(unit))];
+      const auto [known, is_new] = piece_of.emplace(component, piece);
+      if (is_new) {
+        unit_of[component] = unit;
+      } else if (known->second != piece) {
+        ++across;
+        fail(kAcross, {{}, {unit_particle(unit_of[component]), unit_particle(unit)}},
+             "particles {} and {} are coupled in frame {}, and the blade has parted them",
+             unit_particle(unit_of[component]), unit_particle(unit), frame_);
+      }
+    }
+    within(kAcross, static_cast<double>(across), 0);
+    const SweptTissue::Pieces together = tissue_->together();
+    std::vector<int32_t> component_of(at(together.count), -1), first(at(together.count), -1);
+    int64_t torn = 0;
+    for (int32_t unit = 0; unit < units_; ++unit) {
+      const int32_t piece = together.label[at(unit)];
+      if (piece < 0) continue;
+      const int32_t component = label[at(unit_particle(unit))];
+      if (first[at(piece)] < 0) {
+        first[at(piece)] = unit;
+        component_of[at(piece)] = component;
+      } else if (component_of[at(piece)] != component) {
+        ++torn;
+        fail(kWithin, {{}, {unit_particle(first[at(piece)]), unit_particle(unit)}},
+             "particles {} and {} are no longer coupled in frame {}, and no blade has been between them",
+             unit_particle(first[at(piece)]), unit_particle(unit), frame_);
+      }
+    }
+    within(kWithin, static_cast<double>(torn), 0);
+  }
+
+  // What the simulator says is a piece lies in one piece, and joins what nothing has cut.
+  void said(const RunFrame& frame) {
+    if (!tissue_) return;
+    const SweptTissue::Pieces apart = tissue_->apart(), together = tissue_->together();
+    std::map<int32_t, int32_t> seen;
+    std::vector<std::optional<int32_t>> word(at(together.count));
+    int64_t wrong = 0;
+    for (int32_t unit = 0; unit < units_; ++unit) {
+      if (apart.label[at(unit)] < 0) continue;
+      const int32_t particle = unit_particle(unit), name = frame.piece[at(particle)];
+      if (!tissue_->is_beside(unit)) {
+        const auto [known, is_new] = seen.emplace(name, apart.label[at(unit)]);
+        if (!is_new && known->second != apart.label[at(unit)]) {
+          ++wrong;
+          fail(kSaid, {{}, {particle}}, "piece {} has particles on both sides of a cut, such as {}", name, particle);
+        }
+      }
+      std::optional<int32_t>& one = word[at(together.label[at(unit)])];
+      if (!one) one = name;
+      if (*one != name) {
+        ++wrong;
+        fail(kSaid, {{}, {particle}}, "particle {} is in piece {}, and is joined to piece {} by whole tissue", particle,
+             name, *one);
+      }
+    }
+    within(kSaid, static_cast<double>(wrong), 0);
+  }
+
+  const RunHeader header_;
+  std::vector<double> mass_;
+  std::optional<double> mass_was_;
+  std::vector<Found> found_;
+  std::vector<std::string> notes_;
+  RunCoupling coupling_;
+  bool is_coupled_ = false, is_new_coupling_ = false, is_new_gone_ = false, is_new_mass_ = false, has_blade_ = false;
+  int64_t frame_ = 0, frames_ = 0, n_ = 0, coupled_count_ = 0;
+  std::vector<uint8_t> exists_, existed_, ever_;  // [n]
+  std::vector<int32_t> parent_;                   // [n] of each when it was new
+  std::vector<Vec3> was_, velocity_was_, spin_was_, was_places_;
+  std::optional<double> time_was_, energy_was_, volume_at_rest_;
+  std::optional<SweptTissue> tissue_;
+  int32_t units_ = 0, pieces_at_first_ = 0;
+  int unit_corners_ = 0;  // 0: units are particles
+  double lost_ = 0;       // greatest share of the angular momentum that a frame loses
+  int64_t lost_at_ = 0;
+};
+
+RunJudge::RunJudge(RunHeader header) : self_(std::make_unique<Implementation>(std::move(header))) {}
+RunJudge::~RunJudge() = default;
+void RunJudge::couple(RunCoupling coupling) { self_->couple(std::move(coupling)); }
+void RunJudge::weigh(std::vector<double> mass) { self_->weigh(std::move(mass)); }
+void RunJudge::see(const RunFrame& frame) { self_->see(frame); }
+void RunJudge::finish() { self_->finish(); }
+std::vector<Verdict> RunJudge::verdicts() const { return self_->verdicts(); }
+std::vector<RunJudge::NotAsked> RunJudge::not_asked() const { return self_->not_asked(); }
+std::vector<std::string> RunJudge::notes() const { return self_->notes(); }
+RunPieces RunJudge::pieces() const { return self_->pieces(); }
+
+}  // namespace cutproof::oracles

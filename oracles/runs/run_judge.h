@@ -1,0 +1,54 @@
+// Judges a run of anybody's simulator, frame by frame as it is read: what must hold of every one, whatever its method
+// (tolerances.md, Runs; oracles.md, A run of any simulator).
+#pragma once
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "model/verdict.h"
+#include "oracles/runs/run.h"
+
+namespace cutproof::oracles {
+
+// A property of runs. `needs`: what a run has to have so that it is asked, for whoever wonders why it was not.
+struct RunProperty {
+  std::string_view name, unit, source, needs;
+};
+const std::vector<RunProperty>& run_properties();
+
+// How the tissue fell apart, by the blade's sweep alone.
+struct RunPieces {
+  int64_t units = 0, pieces = 0, at_most = 0;           // pieces that surely are, and that may be
+  std::vector<int64_t> sizes;                           // of the sure ones, descending
+  int64_t surely_cut = 0, perhaps_cut = 0, beside = 0;  // edges of tissue; units that may be on either side
+  int64_t coupled = 0;                                  // components of the coupling
+};
+
+class RunJudge {
+ public:
+  explicit RunJudge(RunHeader header);
+  ~RunJudge();
+
+  // Before the first frame for which it holds. Throws nothing: a coupling that cannot be is a verdict.
+  void couple(RunCoupling coupling);
+  void weigh(std::vector<double> mass);  // [n] [kg]
+  void see(const RunFrame& frame);
+  void finish();
+
+  // After finish(): one of each property that was asked, in the order of run_properties(): its first failure, or what
+  // came nearest to its bound.
+  std::vector<Verdict> verdicts() const;
+  struct NotAsked {
+    std::string property, why;
+  };
+  std::vector<NotAsked> not_asked() const;
+  std::vector<std::string> notes() const;
+  RunPieces pieces() const;
+
+ private:
+  class Implementation;
+  std::unique_ptr<Implementation> self_;
+};
+
+}  // namespace cutproof::oracles

@@ -1,0 +1,118 @@
+"""Runs of the simulators in guests/examples/runs, judged by the program: right ones hold, and each fault that one run
+shows fails the property that is named here.
+
+The environment names the program (CUTPROOF).
+"""
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+sys.path.insert(0, str(ROOT / "guests" / "python"))
+import cutproof_run  # noqa: E402
+
+SIMULATORS = ("springs", "tetrahedra", "material_points", "clusters")
+ACROSS, WITHIN = "no coupling across pieces", "pieces coupled within"
+# By fault: the property that has to fail, of all simulators or by simulator; others may fail as well.
+FAULTS = {
+    "heals": {"springs": ACROSS, "tetrahedra": "angular momentum", "material_points": ACROSS, "clusters": ACROSS},
+    "stale_index": {"springs": ACROSS, "tetrahedra": "angular momentum", "material_points": ACROSS,
+                    "clusters": "linear momentum"},
+    "glued_by_one_node": dict.fromkeys(SIMULATORS, ACROSS),
+    "spin_lost": dict.fromkeys(SIMULATORS, "angular momentum"),
+    "revive": {"springs": "what is gone stays gone", "material_points": "what is gone stays gone",
+               "clusters": "what is gone stays gone"},
+    "teleport": dict.fromkeys(SIMULATORS, "no teleport") | {"tetrahedra": "no inverted cell"},
+    "tear_elsewhere": dict.fromkeys(SIMULATORS, WITHIN),
+    "fragment": dict.fromkeys(SIMULATORS, WITHIN),
+    "momentum_from_nothing": dict.fromkeys(SIMULATORS, "linear momentum") | {"tetrahedra": "mass kept"},
+    "inverted": {"tetrahedra": "no inverted cell"},
+}
+
+
+class Runs(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="cutproof_runs_"))
+
+    def simulate(self, simulator, name="run.h5", *options):
+        path = self.folder / name
+        subprocess.run(["/usr/bin/python3", "-B", ROOT / f"guests/examples/runs/{simulator}.py", path, *options],
+                       check=True, stdout=subprocess.DEVNULL)
+        return path
+
+    def check(self, path):
+        """The exit status and the document."""
+        document = self.folder / "verdicts.json"
+        done = subprocess.run([os.environ["CUTPROOF"], "check", path, "--json", document], capture_output=True,
+                              text=True)
+        self.assertIn(done.returncode, (0, 1), done.stderr)
+        return done.returncode, json.loads(document.read_text()), done.stdout
+
+    def failed(self, document):
+        return [verdict["property"] for verdict in document["verdicts"] if not verdict["holds"]]
+
+    def test_right_simulators_hold(self):
+        for simulator in SIMULATORS:
+            for seed in ("1", "2"):
+                with self.subTest(simulator=simulator, seed=seed):
+                    status, document, text = self.check(self.simulate(simulator, "run.h5", "--seed", seed))
+                    self.assertEqual(status, 0, text)
+                    self.assertEqual(document["pieces"]["sure"], 2, text)
+                    self.assertEqual(document["pieces"]["coupled"], 2, text)
+                    for wanted in (ACROSS, WITHIN, "linear momentum", "centre of mass", "angular momentum"):
+                        self.assertIn(wanted, [verdict["property"] for verdict in document["verdicts"]])
+
+    def test_faults_fail_the_property_that_is_named(self):
+        for fault, by_simulator in FAULTS.items():
+            for simulator, wanted in by_simulator.items():
+                with self.subTest(fault=fault, simulator=simulator):
+                    status, document, _ = self.check(self.simulate(simulator, "run.h5", "--fault", fault))
+                    self.assertEqual(status, 1)
+                    self.assertIn(wanted, self.failed(document))
+
+    def test_forms_of_a_file_have_the_same_verdicts(self):
+        told = []
+        for name in ("run.h5", "folder"):
+            _, document, _ = self.check(self.simulate("springs", name))
+            told.append([(v["property"], v["holds"], v["measured"], v["bound"]) for v in document["verdicts"]])
+        self.assertEqual(*told)
+        # One NPZ is one segment: without a cut nothing changes in it.
+        path = self.folder / "run.npz"
+        x = numpy.random.default_rng(1).random((5, 3))
+        with cutproof_run.Writer(path, mass=numpy.ones(5), promises="free") as run:
+            for frame in range(3):
+                run.frame(x + 0.01 * frame, velocities=numpy.ones((5, 3)), time=0.01 * frame, groups=[[0, 1, 2, 3, 4]])
+        status, document, text = self.check(path)
+        self.assertEqual((status, document["run"]["frames"]), (0, 3), text)
+
+    def test_what_does_not_fit_is_refused_by_name(self):
+        x = numpy.zeros((2, 4, 3))
+        for name, array, words in (("velocities", numpy.zeros((2, 3, 3)), "velocities"),
+                                   ("speed", numpy.zeros(2), "speed"),
+                                   ("cells", numpy.zeros((1, 5), int), "5 corners"),
+                                   ("promises", numpy.array("fast"), "cannot promise 'fast'")):
+            with self.subTest(name=name):
+                path = self.folder / "run.npz"
+                numpy.savez(path, positions=x, **{name: array})
+                done = subprocess.run([os.environ["CUTPROOF"], "check", path], capture_output=True, text=True)
+                self.assertEqual(done.returncode, 2)
+                self.assertIn(words, " ".join(done.stderr.split()))
+                self.assertIn(str(path), done.stderr)
+
+    def test_values_that_cannot_be_fail_the_form(self):
+        path = self.folder / "run.npz"
+        for offsets, members in (([0, 2], [0, 9]), ([1, 2], [0, 1]), ([0, 2, 1], [0, 1])):
+            numpy.savez(path, positions=numpy.zeros((2, 4, 3)), groups_offsets=offsets, groups_members=members)
+            status, document, _ = self.check(path)
+            self.assertEqual(status, 1)
+            self.assertEqual(self.failed(document), ["run well formed"])
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)

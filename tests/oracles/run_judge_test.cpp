@@ -1,0 +1,192 @@
+#include "oracles/runs/run_judge.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "model/at.h"
+
+namespace cutproof::run_judge_tests {
+namespace {
+
+using oracles::RunCoupling;
+using oracles::RunFrame;
+using oracles::RunHeader;
+using oracles::RunJudge;
+using oracles::RunPromise;
+
+// A bar of 6 × 2 × 2 particles, h = 0.1 m, that falls freely while it turns; a blade parts it in frames 3 to 5, in the
+// plane between its two halves, and each half then has groups of its own: springs between neighbours.
+struct Bar {
+  static constexpr int kFrames = 10;
+  static constexpr double kH = 0.1, kDt = 0.01;
+  RunHeader header;
+  std::vector<std::vector<Vec3>> x, v, blade;
+  std::vector<std::vector<uint8_t>> alive;
+  std::vector<RunCoupling> coupling;  // by frame
+  std::vector<std::vector<int32_t>> piece;
+  std::vector<double> time, mass;
+
+  Bar() {
+    for (int k = 0; k < 24; ++k) header.rest.push_back(kH * Vec3{double(k % 6), double(k / 6 % 2), double(k / 12)});
+    mass.assign(24, 0.5);
+    header.gravity = Vec3{0, 0, -10};
+    header.spacing = kH;
+    header.promises = 1u << static_cast<int>(RunPromise::free) | 1u << static_cast<int>(RunPromise::angular_momentum);
+    const Vec3 middle = {2.5 * kH, 0.5 * kH, 0.5 * kH}, spin = {0, 0, 2};
+    for (int f = 0; f < kFrames; ++f) {
+      const double t = f * kDt, fallen = -5 * t * t, angle = norm(spin) * t;
+      x.emplace_back();
+      v.emplace_back();
+      for (const Vec3 rest : header.rest) {
+        const Vec3 arm = rest - middle;
+        const Vec3 turned = {std::cos(angle) * arm.x - std::sin(angle) * arm.y,
+                             std::sin(angle) * arm.x + std::cos(angle) * arm.y, arm.z};
+        x.back().push_back(middle + turned + Vec3{0.3 * t, 0, fallen});
+        v.back().push_back(cross(spin, turned) + Vec3{0.3, 0, -10 * t});
+      }
+      time.push_back(t);
+      alive.emplace_back(24, 1);
+      coupling.push_back(springs(f >= 5));
+      piece.emplace_back();
+      for (int k = 0; k < 24; ++k) piece.back().push_back(f >= 5 && k % 6 >= 3 ? 1 : 0);
+      blade.emplace_back();
+      if (f >= 3 && f <= 5) sweep(f);
+    }
+  }
+  // A third of the section in each frame, from below; it turns and falls with the bar.
+  void sweep(int f) {
+    const Vec3 middle = 0.5 * (x[at(f)][2] + x[at(f)][3]), side = x[at(f)][2 + 6] - x[at(f)][2];
+    const double low = (f - 3) * 0.15 - 0.25, high = low + 0.15;
+    const Vec3 up = {0, 0, 1}, across = side / norm(side);
+    blade[at(f)] = {middle - 0.1 * across + low * up, middle + 0.3 * across + low * up,
+                    middle + 0.3 * across + high * up, middle - 0.1 * across + high * up};
+  }
+  static RunCoupling springs(bool parted) {
+    RunCoupling made;
+    made.offsets = {0};
+    for (int32_t k = 0; k < 24; ++k) {
+      for (const int32_t step : {1, 6, 12}) {
+        const bool is_there = step == 1 ? k % 6 < 5 : step == 6 ? k / 6 % 2 == 0 : k < 12;
+        if (!is_there || (parted && step == 1 && k % 6 == 2)) continue;
+        made.members.insert(made.members.end(), {k, k + step});
+        made.offsets.push_back(std::ssize(made.members));
+      }
+    }
+    return made;
+  }
+  std::vector<Verdict> verdicts() const {
+    RunJudge judge(header);
+    judge.weigh(mass);
+    for (int f = 0; f < kFrames; ++f) {
+      judge.couple(coupling[at(f)]);
+      RunFrame frame;
+      frame.index = f;
+      frame.time = time[at(f)];
+      frame.positions = x[at(f)];
+      frame.velocities = v[at(f)];
+      frame.alive = alive[at(f)];
+      frame.blade = blade[at(f)];
+      frame.piece = piece[at(f)];
+      judge.see(frame);
+    }
+    judge.finish();
+    pieces = judge.pieces();
+    return judge.verdicts();
+  }
+  mutable oracles::RunPieces pieces;
+};
+
+std::string failing(const Bar& bar) {
+  std::string names;
+  for (const Verdict& verdict : bar.verdicts()) {
+    if (!verdict.holds) names += (names.empty() ? "" : ", ") + verdict.property;
+  }
+  return names;
+}
+
+TEST(RunJudge, HoldsOfABarThatIsPartedByItsBlade) {
+  const Bar bar;
+  const std::vector<Verdict> verdicts = bar.verdicts();
+  for (const Verdict& verdict : verdicts) EXPECT_TRUE(verdict.holds) << verdict.property << verdict.witness.text;
+  EXPECT_EQ(verdicts.size(), 11u);
+  EXPECT_EQ(bar.pieces.pieces, 2);
+  EXPECT_EQ(bar.pieces.at_most, 2);
+  EXPECT_EQ(bar.pieces.sizes, (std::vector<int64_t>{12, 12}));
+  EXPECT_EQ(bar.pieces.surely_cut, 4);
+  EXPECT_EQ(bar.pieces.coupled, 2);
+}
+
+struct Fault {
+  const char *name, *property;
+  std::function<void(Bar&)> plant;
+};
+class FaultOfARun : public ::testing::TestWithParam<Fault> {};
+
+TEST_P(FaultOfARun, IsRejectedByItsProperty) {
+  Bar bar;
+  GetParam().plant(bar);
+  EXPECT_EQ(failing(bar), GetParam().property);
+}
+
+constexpr std::size_t kLate = 8;
+INSTANTIATE_TEST_SUITE_P(
+    Of, FaultOfARun,
+    ::testing::Values(Fault{"heals", "no coupling across pieces",
+                            [](Bar& b) { b.coupling[kLate] = Bar::springs(false); }},
+                      Fault{"glued_by_one_node", "no coupling across pieces",
+                            [](Bar& b) {
+                              for (std::size_t f = 5; f < Bar::kFrames; ++f) {
+                                b.coupling[f].members.insert(b.coupling[f].members.end(), {2, 3});
+                                b.coupling[f].offsets.push_back(std::ssize(b.coupling[f].members));
+                              }
+                            }},
+                      Fault{"tear_elsewhere", "pieces coupled within",
+                            [](Bar& b) {
+                              RunCoupling& torn = b.coupling[kLate];
+                              RunCoupling made;
+                              made.offsets = {0};
+                              for (std::size_t k = 0; k < torn.members.size(); k += 2) {
+                                if (torn.members[k] == 0 || torn.members[k + 1] == 0) continue;
+                                made.members.insert(made.members.end(), {torn.members[k], torn.members[k + 1]});
+                                made.offsets.push_back(std::ssize(made.members));
+                              }
+                              torn = made;
+                            }},
+                      Fault{"revived", "what is gone stays gone",
+                            [](Bar& b) {
+                              b.alive[6][0] = 0;
+                              b.mass.clear();
+                            }},
+                      Fault{"no_number", "finite", [](Bar& b) { b.x[kLate][5].y = NAN; }},
+                      Fault{"said_otherwise", "pieces as said", [](Bar& b) { b.piece[kLate][0] = 7; }},
+                      Fault{"blade_beside", "something was cut, pieces coupled within, pieces as said",
+                            [](Bar& b) {
+                              for (auto& quad : b.blade) {
+                                for (Vec3& corner : quad) corner.x += 5;
+                              }
+                            }},
+                      Fault{"teleport", "no teleport, linear momentum, centre of mass, angular momentum",
+                            [](Bar& b) {
+                              for (std::size_t f = kLate; f < Bar::kFrames; ++f) b.x[f][0].x += 0.2;
+                              b.v[kLate][0].y += 1e-11;
+                            }},
+                      Fault{"momentum_from_nothing", "linear momentum, angular momentum",
+                            [](Bar& b) {
+                              for (std::size_t f = kLate; f < Bar::kFrames; ++f) b.v[f][0].x += 1e-11;
+                            }},
+                      Fault{"spin_lost", "angular momentum",
+                            [](Bar& b) {
+                              for (std::size_t f = kLate; f < Bar::kFrames; ++f) {
+                                b.v[f][0].x += 1e-11;
+                                b.v[f][23].x -= 1e-11;
+                              }
+                            }}),
+    [](const auto& tested) { return tested.param.name; });
+
+}  // namespace
+}  // namespace cutproof::run_judge_tests
