@@ -75,7 +75,7 @@ void print_properties() {
   }
 }
 
-int print_scenes() {
+int print_scene_names() {
   const std::vector<std::string> names = scene_names();
   if (names.empty()) {
     throw InputError("cutproof info", "--scenes", "The scenes that come with the program are not beside it.",
@@ -120,7 +120,7 @@ std::string date_of_build() {
 }
 
 int info(const InfoOptions& options, const CLI::App& program) {
-  if (options.scenes) return print_scenes();
+  if (options.scenes) return print_scene_names();
   if (!options.mesh.empty()) return examine(options);
   if (options.scene) {
     insist_text(io::scene_reference());
