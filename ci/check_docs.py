@@ -248,7 +248,7 @@ class Check:
                     self.report(file, line, f"nothing has an option {option}")
 
     def options_of_scripts(self):
-        return {option for file in self.tree.files if file.startswith(("ci/", "docs/", "property_tests/"))
+        return {option for file in self.tree.files if file.startswith(("ci/", "guests/examples/", "docs/", "property_tests/"))
                 and file.endswith((".py", ".sh", ".cpp", ".slurm")) for option in re.findall(r"--[a-z][\w-]+", self.tree.text(file))}
 
     def command(self, file, line, text):
