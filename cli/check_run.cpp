@@ -8,6 +8,7 @@
 #include "cli/commands.h"
 #include "cli/findings.h"
 #include "cli/output.h"
+#include "cli/progress.h"
 #include "cli/screen.h"
 #include "cli/terminal.h"
 #include "harness/foreign_run.h"
@@ -19,7 +20,7 @@ namespace {
 
 nlohmann::json to_json(const std::string& file, const harness::JudgedRun& judged) {
   nlohmann::json not_judged = nlohmann::json::array();
-  for (const auto& each : judged.not_asked) not_judged.push_back({{"property", each.property}, {"why", each.why}});
+  for (const auto& each : judged.not_judged) not_judged.push_back({{"property", each.property}, {"why", each.why}});
   const auto failed =
       std::count_if(judged.verdicts.begin(), judged.verdicts.end(), [](const Verdict& v) { return !v.holds; });
   const oracles::RunPieces& pieces = judged.pieces;
@@ -69,27 +70,16 @@ std::string in_words(const oracles::RunPieces& pieces) {
 int check_run(io::RunSegments& segments, const std::string& file, const StateReports& reports) {
   require_writable(reports.json);
   require_writable(reports.junit);
-  const harness::JudgedRun judged = harness::judge_run(segments);
+  const harness::JudgedRun judged = [&] {
+    Progress progress("frame", 0);
+    return harness::judge_run(segments, [&](int64_t frame) { progress.show(frame + 1, "judging"); });
+  }();
   write_document(reports.json, to_json(file, judged));
   const Judging judging{"cutproof check", "cutproof.check.run", reports.again};
-  std::vector<io::JunitCase> cases = cases_of(judged.verdicts, judging);
-  for (const auto& each : judged.not_asked) {
-    io::JunitCase& skipped = cases.emplace_back(io::JunitCase{each.property, judging.class_name});
-    skipped.outcome = io::JunitOutcome::skipped;
-    skipped.message = "not judged: " + each.why;
-  }
-  write_junit(reports.junit, judging, 0, std::move(cases));
   say("run {}: {} frames of {} particles; {}\n", file, judged.frames, judged.particles_at_end, in_words(judged.pieces));
   Shown shown{reports.again};
   shown.in_stages = false;
-  print_verdicts(judged.verdicts, shown);
-  std::vector<std::pair<std::string, std::string>> not_judged;
-  for (const auto& each : judged.not_asked) not_judged.emplace_back(each.property, each.why);
-  print_grouped(undecided("Not judged"), not_judged);
-  print_notes(judged.notes);
-  print_written(reports.json);
-  print_conclusion(judged.verdicts, shown, "what was judged holds.");
-  print_annotations(failures_of(judged.verdicts, judging));
+  show_judged(judged.verdicts, judged.not_judged, judged.notes, shown, judging, reports);
   return judged.holds() ? 0 : 1;
 }
 

@@ -53,6 +53,24 @@ nlohmann::json to_json(const std::string& file, const harness::ForeignState& for
 
 }  // namespace
 
+void show_judged(const std::vector<Verdict>& verdicts, const std::vector<harness::NotJudged>& not_judged,
+                 const std::vector<std::string>& notes, const Shown& shown, const Judging& judging,
+                 const StateReports& reports) {
+  std::vector<io::JunitCase> cases = cases_of(verdicts, judging);
+  std::vector<std::pair<std::string, std::string>> others;
+  for (const harness::NotJudged& each : not_judged) {
+    others.emplace_back(each.property, each.why);
+    cases.push_back({each.property, judging.class_name, 0, io::JunitOutcome::skipped, "not judged: " + each.why});
+  }
+  write_junit(reports.junit, judging, 0, std::move(cases));
+  print_verdicts(verdicts, shown);
+  print_grouped(undecided("Not judged"), others);
+  print_notes(notes);
+  print_written(reports.json);
+  print_conclusion(verdicts, shown, "what was judged holds.");
+  print_annotations(failures_of(verdicts, judging));
+}
+
 int check_state(const io::ArrayFile& contents, const std::string& file, const StateReports& reports) {
   const harness::ForeignState foreign = harness::foreign_state_of(contents, file);
   require_writable(reports.json);
@@ -60,25 +78,11 @@ int check_state(const io::ArrayFile& contents, const std::string& file, const St
   const harness::ForeignVerdicts judged = harness::judge_foreign_state(foreign);
   write_document(reports.json, to_json(file, foreign, judged));
   const Judging judging{"cutproof check", "cutproof.check.state", reports.again};
-  std::vector<io::JunitCase> cases = cases_of(judged.verdicts, judging);
-  for (const harness::NotJudged& each : judged.not_judged) {
-    io::JunitCase& skipped = cases.emplace_back(io::JunitCase{each.property, judging.class_name});
-    skipped.outcome = io::JunitOutcome::skipped;
-    skipped.message = "not judged: " + each.why;
-  }
-  write_junit(reports.junit, judging, 0, std::move(cases));
   say("state {}: {} particles in {} clusters, {}{}\n", file, foreign.state.x.size(), foreign.state.clusters.count(),
       foreign.given.contains("nodes") ? "on a grid" : "as a graph", judged.pieces ? "; " + judged.pieces_in_words : "");
   Shown shown{reports.again};
   shown.in_frames = false;
-  print_verdicts(judged.verdicts, shown);
-  std::vector<std::pair<std::string, std::string>> not_judged;
-  for (const harness::NotJudged& each : judged.not_judged) not_judged.emplace_back(each.property, each.why);
-  print_grouped(undecided("Not judged"), not_judged);
-  print_notes(judged.notes);
-  print_written(reports.json);
-  print_conclusion(judged.verdicts, shown, "what was judged holds.");
-  print_annotations(failures_of(judged.verdicts, judging));
+  show_judged(judged.verdicts, judged.not_judged, judged.notes, shown, judging, reports);
   return judged.holds() ? 0 : 1;
 }
 

@@ -1,7 +1,11 @@
 // `cutproof check` of a file of arrays: one state that somebody else's simulator wrote.
 #pragma once
 #include <string>
+#include <vector>
 
+#include "cli/findings.h"
+#include "cli/terminal.h"
+#include "harness/foreign_judge.h"
 #include "model/io/array_file.h"
 
 namespace cutproof::cli {
@@ -10,6 +14,11 @@ struct StateReports {
   std::string json, junit;  // files; empty: none
   std::string again;        // the command line
 };
+
+// Of a file that was judged: writes JUnit, prints the verdicts and what was not judged.
+void show_judged(const std::vector<Verdict>& verdicts, const std::vector<harness::NotJudged>& not_judged,
+                 const std::vector<std::string>& notes, const Shown& shown, const Judging& judging,
+                 const StateReports& reports);
 
 // Judges, prints, and writes what is asked for. `contents`: of the file. Returns the exit status.
 int check_state(const io::ArrayFile& contents, const std::string& file, const StateReports& reports);

@@ -25,11 +25,10 @@ struct RunWord {
   std::string_view name;
   RunPromise promise;
 };
-constexpr RunWord kRunWords[] = {
-    {"free", RunPromise::free}, {"angular_momentum", RunPromise::angular_momentum}, {"energy", RunPromise::energy}};
-
-// What two runs show, and one does not.
-constexpr std::string_view kOfTwoRuns[] = {"deterministic"};
+constexpr RunWord kRunWords[] = {{"free", RunPromise::free},
+                                 {"angular_momentum", RunPromise::angular_momentum},
+                                 {"energy", RunPromise::energy},
+                                 {"deterministic", RunPromise::deterministic}};
 
 uint32_t promises_of(const NamedArrays& in, const std::string& text) {
   uint32_t bits = 0;
@@ -37,7 +36,7 @@ uint32_t promises_of(const NamedArrays& in, const std::string& text) {
     const std::size_t end = std::min(text.find(' ', begin), text.size());
     const std::string_view word = std::string_view(text).substr(begin, end - begin);
     begin = end + 1;
-    if (word.empty() || std::ranges::find(kOfTwoRuns, word) != std::end(kOfTwoRuns)) continue;
+    if (word.empty()) continue;
     const auto found =
         std::find_if(std::begin(kRunWords), std::end(kRunWords), [&](const RunWord& w) { return w.name == word; });
     if (found == std::end(kRunWords)) {
@@ -83,7 +82,6 @@ class Segment {
   int64_t frames() const { return frames_; }
   int64_t particles() const { return particles_; }
   Precision precision() const { return precision_; }
-  bool has_blade() const { return !blade_.empty(); }
 
   oracles::RunFrame frame(int64_t k) const {
     oracles::RunFrame made;
@@ -271,11 +269,14 @@ bool JudgedRun::holds() const {
 JudgedRun judge_run(io::RunSegments& segments, const std::function<void(int64_t)>& frame_done) {
   JudgedRun judged;
   std::unique_ptr<oracles::RunJudge> judge;
+  bool is_deterministic = false;
   while (const std::optional<io::ArrayFile> contents = segments.next()) {
     const NamedArrays in(*contents, segments.source(), run_arrays(), run_texts());
     const Segment segment(in, judged.frames);
     if (!judge) {
-      judge = std::make_unique<oracles::RunJudge>(header_of(in, *contents, segment));
+      const oracles::RunHeader header = header_of(in, *contents, segment);
+      is_deterministic = header.promised(RunPromise::deterministic);
+      judge = std::make_unique<oracles::RunJudge>(header);
       judged.particles_at_start = segment.particles();
       judged.single_precision = segment.precision() == Precision::binary32;
     }
@@ -299,7 +300,9 @@ JudgedRun judge_run(io::RunSegments& segments, const std::function<void(int64_t)
   }
   judge->finish();
   judged.verdicts = judge->verdicts();
-  judged.not_asked = judge->not_asked();
+  for (const auto& [property, why] : judge->not_asked()) judged.not_judged.push_back({property, why});
+  if (is_deterministic) judged.not_judged.push_back({"determinism", "one run does not show what another one does"});
+  if (judged.given.contains("vertices")) judged.not_judged.push_back({"skin", "the skin of a run is not judged"});
   judged.pieces = judge->pieces();
   for (const std::string& note : judge->notes()) judged.notes.push_back(note);
   return judged;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/foreign_judge.h"
 #include "harness/named_arrays.h"
 #include "model/io/run_segments.h"
 #include "oracles/runs/run_judge.h"
@@ -17,7 +18,7 @@ const std::vector<KnownArray>& run_texts();
 
 struct JudgedRun {
   std::vector<Verdict> verdicts;
-  std::vector<oracles::RunJudge::NotAsked> not_asked;
+  std::vector<NotJudged> not_judged;
   std::vector<std::string> notes;
   oracles::RunPieces pieces;
   int64_t frames = 0, segments = 0;

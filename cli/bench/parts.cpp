@@ -69,10 +69,8 @@ void print_parts(const json& document) {
     rows.push_back(row);
   }
   print();
-  say("Times are of a frame, relative to that of the scene as it is, without nothing. RMS, max: how far, in any frame, "
-      "tissue "
-      "is from where it is in the scene as it is; removed otherwise: particles that only one of both has in the "
-      "end.\n");
+  say("Times are of a frame; relative: to the scene as it is. RMS, max: how far, in any frame, tissue is from where it "
+      "is in the scene as it is. Removed otherwise: particles that only one of both has in the end.\n");
 }
 
 }  // namespace

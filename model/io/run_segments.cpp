@@ -33,6 +33,13 @@ std::vector<std::string> files_in(const std::string& folder) {
   if (failed) throw InputError(folder, "", "The folder cannot be read.", "Check its permissions.");
   if (files.size() > kMostSegments) throw InputError(folder, "", "There are too many files.", "Write longer segments.");
   std::sort(files.begin(), files.end());
+  const auto series = [](const std::string& file) { return file.substr(0, file.size() - std::size("000000.npz") + 1); };
+  for (const std::string& file : files) {
+    if (series(file) != series(files.front())) {
+      throw InputError(file, "", "The folder has another series as well: " + files.front() + ".",
+                       "Keep one run in a folder.");
+    }
+  }
   return files;
 }
 

@@ -13,7 +13,7 @@
 namespace cutproof::oracles {
 namespace {
 
-// Where the segment from p to q is nearest to the segment from a to b.
+// How far the segment from p to q is from the segment from a to b.
 double distance_of_segments(Vec3 p, Vec3 q, Vec3 a, Vec3 b) {
   const Vec3 d = q - p, e = b - a, r = p - a;
   const double dd = dot(d, d), ee = dot(e, e), de = dot(d, e), dr = dot(d, r), er = dot(e, r);
@@ -122,7 +122,8 @@ std::vector<std::array<int32_t, 2>> tissue_at_rest(std::span<const Vec3> rest, d
 
 std::vector<std::array<int32_t, 2>> tissue_of_cells(std::span<const int32_t> cells, int corners) {
   const auto units = static_cast<int32_t>(std::ssize(cells) / corners);
-  constexpr int kOfTetrahedron[4][4] = {{0, 1, 2, 2}, {0, 1, 3, 3}, {0, 2, 3, 3}, {1, 2, 3, 3}};
+  constexpr int kNone = -1;
+  constexpr int kOfTetrahedron[4][4] = {{0, 1, 2, kNone}, {0, 1, 3, kNone}, {0, 2, 3, kNone}, {1, 2, 3, kNone}};
   constexpr int kOfHexahedron[6][4] = {{0, 1, 2, 3}, {4, 5, 6, 7}, {0, 1, 5, 4},
                                        {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}};
   std::map<std::array<int32_t, 4>, int32_t> open;
@@ -132,7 +133,7 @@ std::vector<std::array<int32_t, 2>> tissue_of_cells(std::span<const int32_t> cel
       std::array<int32_t, 4> face;
       for (std::size_t k = 0; k < 4; ++k) {
         const int corner = corners == 4 ? kOfTetrahedron[side][k] : kOfHexahedron[side][k];
-        face[k] = cells[at(cell) * at(corners) + at(corner)];
+        face[k] = corner == kNone ? kNone : cells[at(cell) * at(corners) + at(corner)];
       }
       std::sort(face.begin(), face.end());
       const auto [other, is_new] = open.emplace(face, cell);

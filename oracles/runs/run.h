@@ -3,7 +3,6 @@
 #pragma once
 #include <array>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -17,6 +16,7 @@ enum class RunPromise : uint8_t {
   free,              // nothing outside pushes, but gravity and what `contact_impulse` says
   angular_momentum,  // kept while nothing pushes
   energy,            // `energy` never grows while nothing pushes
+  deterministic,     // a second run has the same bits, which one run does not show
 };
 
 // Lists are empty where they are not given. Particles are numbered from 0; n is their number in the first frame.

@@ -47,28 +47,29 @@ constexpr double kBetween = 2;
 bool is_number(Vec3 x) { return std::isfinite(x.x) && std::isfinite(x.y) && std::isfinite(x.z); }
 bool is_blank(Vec3 x) { return std::isnan(x.x) && std::isnan(x.y) && std::isnan(x.z); }
 
-}  // namespace
+// A property of runs, by Which. `needs`: what a run has to have so that it is asked.
+struct RunProperty {
+  const char *name, *unit, *source, *needs;
+};
+constexpr RunProperty kRunProperties[kProperties] = {
+    {"run well formed", "1", "docs/reference/run.md", "nothing"},
+    {"finite", "1", kSource, "nothing"},
+    {"what is gone stays gone", "1", kSource, "nothing"},
+    {"no teleport", "m", kSource, "velocities and time"},
+    {"something was cut", "1", kSource, "a blade, and tissue: edges, cells, nodes, or rest and spacing"},
+    {"no coupling across pieces", "1", kSource, "coupling groups or cells, and tissue"},
+    {"pieces coupled within", "1", kSource, "coupling groups or cells, tissue and a blade"},
+    {"pieces as said", "1", kSource, "piece and tissue"},
+    {"linear momentum", "kg m/s", kSource, "velocities, mass, time, and contact_impulse or the promise 'free'"},
+    {"centre of mass", "m", kSource, "velocities, mass, time, and contact_impulse or the promise 'free'"},
+    {"angular momentum", "kg m²/s", kSource, "the promise 'angular_momentum', velocities, mass and time"},
+    {"energy", "J", kSource, "the promise 'energy', and energy"},
+    {"no inverted cell", "1", kSource, "cells"},
+    {"tissue kept", "1", kSource, "cells and rest"},
+    {"mass kept", "kg", kSource, "mass that is given anew"},
+};
 
-const std::vector<RunProperty>& run_properties() {
-  static const std::vector<RunProperty> all = {
-      {"run well formed", "1", "docs/reference/run.md", "nothing"},
-      {"finite", "1", kSource, "nothing"},
-      {"what is gone stays gone", "1", kSource, "nothing"},
-      {"no teleport", "m", kSource, "velocities and time"},
-      {"something was cut", "1", kSource, "a blade, and tissue: edges, cells, nodes, or rest and spacing"},
-      {"no coupling across pieces", "1", kSource, "coupling groups or cells, and tissue"},
-      {"pieces coupled within", "1", kSource, "coupling groups or cells, tissue and a blade"},
-      {"pieces as said", "1", kSource, "piece and tissue"},
-      {"linear momentum", "kg m/s", kSource, "velocities, mass, time, and contact_impulse or the promise 'free'"},
-      {"centre of mass", "m", kSource, "velocities, mass, time, and contact_impulse or the promise 'free'"},
-      {"angular momentum", "kg m²/s", kSource, "the promise 'angular_momentum', velocities, mass and time"},
-      {"energy", "J", kSource, "the promise 'energy', and energy"},
-      {"no inverted cell", "1", kSource, "cells"},
-      {"tissue kept", "1", kSource, "cells and rest"},
-      {"mass kept", "kg", kSource, "mass that is given anew"},
-  };
-  return all;
-}
+}  // namespace
 
 class RunJudge::Implementation {
  public:
@@ -99,16 +100,17 @@ class RunJudge::Implementation {
     frame_ = frame.index;
     ++frames_;
     n_ = std::ssize(frame.positions);
-    const auto sized = [&](std::ptrdiff_t size) { return size == 0 || size == n_; };
-    if (n_ < std::ssize(was_) || !sized(std::ssize(frame.velocities)) || !sized(std::ssize(frame.alive))) {
-      fail(kForm, {}, "frame {} has {} particles, and the one before has {}", frame_, n_, was_.size());
-      return;
+    if (n_ < std::ssize(was_)) {
+      return fail(kForm, {}, "frame {} has {} particles, and the one before has {}", frame_, n_, was_.size());
+    }
+    if (frame.time && time_was_ && !(*frame.time > *time_was_)) {
+      return fail(kForm, {}, "time does not ascend: {} s after {} s", *frame.time, *time_was_);
     }
     if (is_new_coupling_ && !check_members()) return;
     find_existing(frame);
     check_finite(frame);
     if (!holds(kFinite) || !holds(kForm)) return;
-    if (!tissue_) {
+    if (frames_ == 1) {
       lay_tissue();
       if (tissue_) pieces_at_first_ = tissue_->apart().count;
     }
@@ -169,7 +171,7 @@ class RunJudge::Implementation {
       const bool is_stopped = !holds(kForm) || !holds(kFinite);
       all.push_back({verdict.property, is_stopped               ? "the run is not well formed, or not finite"
                                        : !found_[k].why.empty() ? found_[k].why
-                                                                : "needs " + std::string(run_properties()[k].needs)});
+                                                                : "needs " + std::string(kRunProperties[k].needs)});
     }
     return all;
   }
@@ -201,7 +203,7 @@ class RunJudge::Implementation {
   };
 
   static Verdict fresh(Which which) {
-    const RunProperty& property = run_properties()[which];
+    const RunProperty& property = kRunProperties[which];
     Verdict verdict;
     verdict.property = property.name;
     verdict.unit = property.unit;
@@ -311,16 +313,14 @@ class RunJudge::Implementation {
       tissue_.emplace(units_, header_.edges);
       return;
     }
-    const std::span<const Vec3> rest = header_.rest.empty() ? std::span<const Vec3>() : std::span(header_.rest);
-    if (std::ssize(rest) != n_ || !(header_.spacing > 0)) return;
-    tissue_.emplace(units_, tissue_at_rest(rest, header_.spacing));
+    if (std::ssize(header_.rest) != n_ || !(header_.spacing > 0)) return;
+    tissue_.emplace(units_, tissue_at_rest(header_.rest, header_.spacing));
   }
 
   // Each particle goes where its velocity takes it: nothing may jump.
   void teleport(const RunFrame& frame) {
     if (frame.velocities.empty() || velocity_was_.empty() || !frame.time || !time_was_) return;
     const double dt = *frame.time - *time_was_;
-    if (!(dt > 0)) return fail(kForm, {}, "time does not ascend: {} s after {} s", *frame.time, *time_was_);
     double change = 0, farthest = 0;
     for (std::size_t i = 0; i < was_.size(); ++i) {
       if (exists_[i] == 0 || existed_[i] == 0) continue;
@@ -335,9 +335,8 @@ class RunJudge::Implementation {
       const double off = norm(frame.positions[i] - was_[i] - dt * mean);
       if (!within(kTeleport, off, bound))
         fail(kTeleport, {{}, {static_cast<int32_t>(i)}},
-             "particle {} is {:.3g} m from where its velocity takes it in frame {}, in which no velocity changes by "
-             "more "
-             "than {:.3g} m/s",
+             "particle {} is {:.3g} m from where its velocity takes it in frame {}; no velocity changes by more than "
+             "{:.3g} m/s",
              i, off, frame_, change);
     }
   }
@@ -366,7 +365,7 @@ class RunJudge::Implementation {
     if (is_held && !frame.contact_impulse) return;
     const double dt = *frame.time - *time_was_, dt_s = dt / static_cast<double>(header_.steps);
     const Vec3 gravity = header_.gravity.value_or(Vec3{}), impulse = frame.contact_impulse.value_or(Vec3{});
-    double mass = 0, size = 0, squares = 0, farthest = 0;
+    double mass = 0, squares = 0, farthest = 0;
     Vec3 p, p_was, x, x_was;
     for (std::size_t i = 0; i < exists_.size(); ++i) {
       if (exists_[i] != 0) farthest = std::max({farthest, norm(frame.positions[i]), norm(was_[i])});
@@ -380,16 +379,17 @@ class RunJudge::Implementation {
       x += m * frame.positions[i];
       x_was += m * was_[i];
       const double rounds = norm(frame.velocities[i]) + norm(velocity_was_[i]) + kStable * farthest / dt_s;
-      size += m * rounds;
       squares += m * rounds * m * rounds;
     }
     const double steps = static_cast<double>(header_.steps), decay = header_.damping * dt;
     const double rounding = kDeviations * header_.u * std::sqrt(steps * squares);
-    // Schemes differ in how they damp, by the square of c dt.
+    // A scheme damps by (1 - c dt / S)^S, its inverse, or between: (c dt)² off the exponential at most, and what is
+    // added meanwhile is damped or not.
     const double pushed = norm(impulse) + mass * norm(gravity) * dt + norm(p_was);
     const Vec3 expected =
         std::exp(-decay) * p_was + (decay > 0 ? -std::expm1(-decay) / decay : 1) * (mass * dt * gravity) + impulse;
-    const double slack = (decay + decay * decay) * (norm(impulse) + mass * norm(gravity) * dt);
+    const double slack =
+        decay * decay * norm(p_was) + (decay + decay * decay) * (norm(impulse) + mass * norm(gravity) * dt);
     const double off = norm(p - expected);
     if (!within(kMomentum, off, rounding + slack + 4 * header_.u * pushed))
       fail(kMomentum, {}, "momentum changes by {:.3g} kg m/s in frame {} more than gravity and contacts explain", off,
@@ -488,6 +488,7 @@ class RunJudge::Implementation {
     within(kInverted, static_cast<double>(inverted), 0);
     if (!weighs) return;
     if (!volume_at_rest_) volume_at_rest_ = volume;
+    if (*volume_at_rest_ == 0) return;
     const double lost = std::abs(volume - *volume_at_rest_) / std::abs(*volume_at_rest_);
     if (!within(kTissue, lost, kDeviations * header_.u * static_cast<double>(count)))
       fail(kTissue, {}, "cells have {:.6g} m³ at rest in frame {}, and had {:.6g}", volume, frame_, *volume_at_rest_);
@@ -504,6 +505,7 @@ class RunJudge::Implementation {
     if (!tissue_ || (by_cells() && std::ssize(coupling_.cells) != int64_t{units_} * unit_corners_)) {
       if (tissue_) found_[kAcross].why = found_[kWithin].why = "the number of cells changes";
       tissue_.reset();
+      unit_corners_ = 0;
       return;
     }
     for (int32_t unit = 0; unit < units_; ++unit) {

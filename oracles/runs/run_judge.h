@@ -3,19 +3,12 @@
 #pragma once
 #include <memory>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "model/verdict.h"
 #include "oracles/runs/run.h"
 
 namespace cutproof::oracles {
-
-// A property of runs. `needs`: what a run has to have so that it is asked, for whoever wonders why it was not.
-struct RunProperty {
-  std::string_view name, unit, source, needs;
-};
-const std::vector<RunProperty>& run_properties();
 
 // How the tissue fell apart, by the blade's sweep alone.
 struct RunPieces {
@@ -36,8 +29,8 @@ class RunJudge {
   void see(const RunFrame& frame);
   void finish();
 
-  // After finish(): one of each property that was asked, in the order of run_properties(): its first failure, or what
-  // came nearest to its bound.
+  // After finish(): one of each property that was asked, its first failure or what came nearest to its bound; and why
+  // the others were not.
   std::vector<Verdict> verdicts() const;
   struct NotAsked {
     std::string property, why;

@@ -53,8 +53,7 @@ void add_parts(Sheet& sheet, const Field& document) {
   const RowColumns columns = columns_of_parts();
   Grid grid = grid_of("Every run",
                       "Times are of a frame, relative to the scene as it is. The distance is from the run of the scene "
-                      "as it is, in the worst of its "
-                      "frames: what the part does, and no error.",
+                      "as it is, in the worst of its frames: what the part does, and no error.",
                       columns, 1);
   std::string scene, stage;
   int64_t frames = 0;

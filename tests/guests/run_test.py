@@ -38,7 +38,9 @@ FAULTS = {
 
 class Runs(unittest.TestCase):
     def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="cutproof_runs_"))
+        folder = tempfile.TemporaryDirectory(prefix="cutproof_runs_")
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
 
     def simulate(self, simulator, name="run.h5", *options):
         path = self.folder / name

@@ -297,8 +297,8 @@ TEST(Iterates, AreNoneWhereTheSceneHasNone) {
   EXPECT_FALSE(judged(turned, scene).holds);
 }
 
-// Friction takes places farther apart than what would go there: by the bound that candidates are given, and by more than
-// nothing.
+// Friction takes places farther apart than what would go there: by the bound that candidates are given, and by more
+// than nothing.
 TEST(Contact, TakesPlacesApartByNoMoreThanFrictionWidens) {
   cutproof::Setup setup = pressed_block().setup;
   setup.walls = {{2, +1, 0, 1.5}};

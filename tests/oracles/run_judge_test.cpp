@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <string>
@@ -119,6 +120,58 @@ TEST(RunJudge, HoldsOfABarThatIsPartedByItsBlade) {
   EXPECT_EQ(bar.pieces.sizes, (std::vector<int64_t>{12, 12}));
   EXPECT_EQ(bar.pieces.surely_cut, 4);
   EXPECT_EQ(bar.pieces.coupled, 2);
+}
+
+// Two tetrahedra share a face, whatever the order of their corners.
+TEST(RunJudge, KnowsTheFacesThatCellsShare) {
+  const std::vector<Vec3> x = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 1}};
+  for (const auto& other : {std::array{1, 2, 3, 4}, std::array{4, 3, 2, 1}, std::array{3, 1, 2, 4}}) {
+    RunJudge judge({});
+    RunCoupling cells;
+    cells.cells = {0, 1, 2, 3, other[0], other[1], other[2], other[3]};
+    cells.corners = 4;
+    judge.couple(cells);
+    RunFrame frame;
+    frame.positions = x;
+    judge.see(frame);
+    // Groups alone are no tissue: nothing more is known of pieces.
+    RunCoupling groups;
+    groups.offsets = {0, 2};
+    groups.members = {0, 4};
+    EXPECT_EQ(judge.pieces().pieces, 1);
+    judge.couple(groups);
+    judge.see(frame);
+    judge.finish();
+    EXPECT_EQ(judge.pieces().units, 0);
+  }
+}
+
+// A step of semi-implicit or implicit damping is off the exponential by the square of c dt.
+TEST(RunJudge, AllowsWhatSchemesOfDampingDiffer) {
+  const double dt = 0.01, c = 20;
+  for (const double factor : {1 - c * dt, 1 / (1 + c * dt), 1 - 2 * c * dt}) {
+    RunHeader header;
+    header.damping = c;
+    header.promises = 1u << static_cast<int>(RunPromise::free);
+    RunJudge judge(header);
+    judge.weigh({2});
+    Vec3 x, v = {3, 0, 0};
+    for (int f = 0; f < 5; ++f) {
+      RunFrame frame;
+      frame.index = f;
+      frame.time = f * dt;
+      frame.positions = {&x, 1};
+      frame.velocities = {&v, 1};
+      judge.see(frame);
+      v = factor * v;
+      x += dt * v;
+    }
+    judge.finish();
+    for (const Verdict& verdict : judge.verdicts()) {
+      const bool is_right = factor > 1 - 1.5 * c * dt || verdict.property != "linear momentum";
+      EXPECT_EQ(verdict.holds, is_right) << verdict.property << factor;
+    }
+  }
 }
 
 struct Fault {
