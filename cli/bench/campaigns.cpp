@@ -14,7 +14,8 @@ void print_row_of_campaigns(const json& document) {
 
 void print_campaigns(const json& document) {
   say_as_it_is("\n" + table_of(document.at("rows"), columns_of(report::kCampaignsSuite), 2));
-  say("shares are of the time of all threads: simulating is what they wait for a device, too; max [h]: greatest distance "
+  say("shares are of the time of all threads: simulating is what they wait for a device, too; max [h]: greatest "
+      "distance "
       "of a position after a step from the reference's\n");
 }
 
