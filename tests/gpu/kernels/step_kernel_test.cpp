@@ -648,5 +648,65 @@ TEST(GpuContacts, ProjectWhereTheReferenceDoes) {
   EXPECT_LE(far_apart, 4);
 }
 
+// A blade that stands obliquely 16 h from the rest position of the one particle, where positions are rounded by 2^-20
+// h.
+constexpr RestPoint kOrigin = {1, {0, 0, 0}};
+constexpr PoseF kOblique = {{0, 0, 16}, {0, 1, 0}, {-0.8f, 0, 0.6f}, {0.6f, 0, 0.8f}};
+constexpr MoveF kResting = {kOblique, kOblique, 1};
+Float3 beside_oblique(float along, float back, float height) {
+  return kOblique.edge + along * kOblique.along + back * kOblique.back + height * kOblique.normal;
+}
+
+TEST(GpuContacts, RubAlongThePlateHoweverShortThePush) {
+  Random random(32);
+  const Contacts contacts = {nullptr, 0, &kResting, 4, 6, 0.25f, 1024, false};
+  int pressed = 0;
+  for (int trial = 0; trial < 1000; ++trial) {
+    // A few roundings deep, and a friction that holds fast whatever slides a quarter of its reach.
+    const auto push = static_cast<float>(uniform(random, 2, 6)) * 0x1p-20f;
+    const Float3 wanted = beside_oblique(static_cast<float>(uniform(random, -3, 3)),
+                                         static_cast<float>(uniform(random, 0.5, 5)), contacts.clearance - push);
+    const double angle = uniform(random, 0, 6.28);
+    const float slid = 0.25f * contacts.blade_friction * push;
+    const Float3 slide = slid * (static_cast<float>(std::cos(angle)) * kOblique.along +
+                                 static_cast<float>(std::sin(angle)) * kOblique.back);
+    const Float3 start = wanted - slide;
+    if (dot(wanted - kOblique.edge, kOblique.normal) > contacts.clearance - 0x1p-20f) continue;  // rounded out of it
+    ++pressed;
+    bool in_turn = false;
+    const Float3 gone = project(contacts, kOrigin, wanted, 1, start, in_turn) - start;
+    EXPECT_LE(std::hypot(dot(gone, kOblique.along), dot(gone, kOblique.back)), 8 * 0x1p-20f) << "trial " << trial;
+  }
+  EXPECT_GT(pressed, 800);
+}
+
+TEST(GpuContacts, RefuseAPlaceThatIsWorseBeyondItsMarginAndNoOther) {
+  Random random(33);
+  const auto farther = [](float distance, float of_x, double roundings) {
+    return static_cast<float>(roundings * kUnit * (double{distance} + of_x));
+  };
+  int in_turn_count = 0;
+  for (int trial = 0; trial < 1000; ++trial) {
+    const WallF wall = {2, -1, 16.5f, 0};  // keeps the particle under it, as the blade does
+    const Contacts contacts = {&wall, 1, &kResting, 4, 6, 0.25f, 0, true};
+    const Float3 free =
+        beside_oblique(static_cast<float>(uniform(random, -3, 3)), static_cast<float>(uniform(random, 0.5, 2)), -1);
+    bool in_turn = false;
+    const Float3 next = project(contacts, kOrigin, free, 1, free, in_turn);
+    const float distance = norm(next - free);
+    if (!in_turn || distance == 0) continue;
+    ++in_turn_count;
+    // Places a little nearer to `free` than the next one, by half and by twice the margin.
+    for (const double share : {0.5, 2.0}) {
+      const float nearer = farther(distance, norm(next), share * kRefusalRoundings);
+      const Float3 x = next + (nearer / distance) * (free - next);
+      const Float3 taken = next_position(contacts, kOrigin, free, 1, free, x);
+      EXPECT_EQ(norm(taken - next) == 0, share < 1) << "trial " << trial;
+      EXPECT_EQ(norm(taken - x) == 0, share > 1) << "trial " << trial;
+    }
+  }
+  EXPECT_GT(in_turn_count, 300);
+}
+
 }  // namespace
 }  // namespace cutproof::gpu::step_kernel_test
