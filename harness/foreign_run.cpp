@@ -1,266 +1,13 @@
 #include "harness/foreign_run.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
 #include <memory>
 #include <optional>
-#include <span>
 #include <utility>
 
-#include "model/at.h"
-#include "model/error.h"
-#include "oracles/rounding.h"
+#include "harness/run_frames.h"
 
 namespace cutproof::harness {
-
-namespace {
-
-using oracles::RunPromise;
-
-struct RunWord {
-  std::string_view name;
-  RunPromise promise;
-};
-constexpr RunWord kRunWords[] = {{"free", RunPromise::free},
-                                 {"angular_momentum", RunPromise::angular_momentum},
-                                 {"energy", RunPromise::energy},
-                                 {"deterministic", RunPromise::deterministic}};
-
-uint32_t promises_of(const NamedArrays& in, const std::string& text) {
-  uint32_t bits = 0;
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = std::min(text.find(' ', begin), text.size());
-    const std::string_view word = std::string_view(text).substr(begin, end - begin);
-    begin = end + 1;
-    if (word.empty()) continue;
-    const auto found =
-        std::find_if(std::begin(kRunWords), std::end(kRunWords), [&](const RunWord& w) { return w.name == word; });
-    if (found == std::end(kRunWords)) {
-      std::string known;
-      for (const RunWord& each : kRunWords) known += (known.empty() ? "" : ", ") + std::string(each.name);
-      in.refuse("promises", fmt::format("A run cannot promise '{}'.", word), "Use " + known + ".");
-    }
-    bits |= 1u << static_cast<int>(found->promise);
-  }
-  return bits;
-}
-
-// Frames of one segment, of arrays that lie in memory one frame after the other.
-class Segment {
- public:
-  Segment(const NamedArrays& in, int64_t frame) : in_(in), first_(frame) {
-    const Array& positions = in.require_either("positions", {-1, -1, 3}, {-1, 3});
-    is_one_ = positions.shape.size() == 2;
-    frames_ = is_one_ ? 1 : positions.shape[0];
-    particles_ = positions.shape[is_one_ ? 0 : 1];
-    if (frames_ == 0 || particles_ == 0)
-      in.refuse("positions", "There are no frames, or no particles.", "Write at least one of both.");
-    if (particles_ > kMost)
-      in.refuse("positions", "There are more particles than 32-bit numbers can name.", "Write fewer.");
-    precision_ = precision_of(positions);
-    positions_ = in.vectors(positions);
-    velocities_ = vectors("velocities", particles_);
-    spin_ = vectors("spin", particles_);
-    alive_ = flags("alive");
-    held_ = flags("held");
-    removed_ = flags("removed");
-    impulse_ = vectors("contact_impulse", 0);
-    time_ = numbers("time");
-    energy_ = numbers("energy");
-    if (const Array* const blade = find_blade()) {
-      const auto corners = blade->shape[blade->shape.size() - 2];
-      blade_ = quads(in.vectors(*blade), at(corners));
-    }
-    if (const Array* const parent = in.find("parent", {particles_})) parent_ = in.integers(*parent);
-    if (const Array* const piece = in.find("piece", {particles_})) piece_ = in.integers(*piece);
-  }
-
-  int64_t frames() const { return frames_; }
-  int64_t particles() const { return particles_; }
-  Precision precision() const { return precision_; }
-
-  oracles::RunFrame frame(int64_t k) const {
-    oracles::RunFrame made;
-    made.index = first_ + k;
-    const auto part = [&](const auto& all) { return of_frame(all, k); };
-    made.positions = part(positions_);
-    made.velocities = part(velocities_);
-    made.spin = part(spin_);
-    made.alive = part(alive_);
-    made.held = part(held_);
-    made.removed = part(removed_);
-    // A frame in which the blade sweeps nothing has none.
-    made.blade = part(blade_);
-    if (std::ranges::all_of(made.blade, [](Vec3 x) { return std::isnan(x.x + x.y + x.z); })) made.blade = {};
-    made.parent = parent_;
-    if (k == 0) made.piece = piece_;
-    if (!impulse_.empty()) made.contact_impulse = impulse_[at(k)];
-    if (!time_.empty()) made.time = time_[at(k)];
-    if (!energy_.empty()) made.energy = energy_[at(k)];
-    return made;
-  }
-
- private:
-  static constexpr int64_t kMost = std::numeric_limits<int32_t>::max();
-
-  // Of an array with an entry for each frame, and in that `inner` more unless it is 0.
-  const Array* find(std::string_view name, std::vector<int64_t> inner) const {
-    if (!in_.has(name)) return nullptr;
-    std::vector<int64_t> by_frame = inner;
-    by_frame.insert(by_frame.begin(), frames_);
-    return &(is_one_ ? in_.require_either(name, by_frame, inner) : in_.require(name, by_frame));
-  }
-  std::vector<Vec3> vectors(std::string_view name, int64_t inner) const {
-    const Array* const found = find(name, inner == 0 ? std::vector<int64_t>{3} : std::vector<int64_t>{inner, 3});
-    return found == nullptr ? std::vector<Vec3>{} : in_.vectors(*found);
-  }
-  std::vector<double> numbers(std::string_view name) const {
-    const Array* const found = find(name, {});
-    return found == nullptr ? std::vector<double>{} : in_.numbers(*found);
-  }
-  std::vector<uint8_t> flags(std::string_view name) const {
-    const Array* const found = find(name, {particles_});
-    std::vector<uint8_t> made;
-    if (found == nullptr) return made;
-    for (const int64_t flag : in_.long_integers(*found)) {
-      if (flag != 0 && flag != 1) in_.refuse(name, fmt::format("It holds {}.", flag), "Write 1 or 0.");
-      made.push_back(static_cast<uint8_t>(flag));
-    }
-    return made;
-  }
-  const Array* find_blade() const {
-    if (!in_.has("blade")) return nullptr;
-    const Array& blade = is_one_ ? in_.require_either("blade", {frames_, -1, -1, 3}, {-1, -1, 3})
-                                 : in_.require("blade", {frames_, -1, -1, 3});
-    const int64_t corners = blade.shape[blade.shape.size() - 2];
-    if (corners != 3 && corners != 4)
-      in_.refuse("blade", fmt::format("Its patches have {} corners.", corners), "Write triangles or quads.");
-    return &blade;
-  }
-  static std::vector<Vec3> quads(const std::vector<Vec3>& corners, std::size_t each) {
-    std::vector<Vec3> made;
-    for (std::size_t k = 0; k + each <= corners.size(); k += each) {
-      for (std::size_t c = 0; c < 4; ++c) made.push_back(corners[k + std::min(c, each - 1)]);
-    }
-    return made;
-  }
-  template <class T>
-  std::span<const T> of_frame(const std::vector<T>& all, int64_t k) const {
-    const std::size_t each = all.size() / at(frames_);
-    return std::span<const T>(all).subspan(at(k) * each, each);
-  }
-
-  const NamedArrays& in_;
-  const int64_t first_;
-  bool is_one_ = false;
-  int64_t frames_ = 0, particles_ = 0;
-  Precision precision_ = Precision::binary64;
-  std::vector<Vec3> positions_, velocities_, spin_, impulse_, blade_;
-  std::vector<double> time_, energy_;
-  std::vector<uint8_t> alive_, held_, removed_;
-  std::vector<int32_t> parent_, piece_;
-};
-
-oracles::RunHeader header_of(const NamedArrays& in, const io::ArrayFile& contents, const Segment& first) {
-  oracles::RunHeader header;
-  const int64_t n = first.particles();
-  if (const Array* const rest = in.find("rest", {n, 3})) header.rest = in.vectors(*rest);
-  if (const Array* const gravity = in.find("gravity", {3})) header.gravity = in.vectors(*gravity).front();
-  if (const Array* const edges = in.find("edges", {-1, 2})) {
-    const std::vector<int32_t> ends = in.integers(*edges);
-    for (std::size_t k = 0; k < ends.size(); k += 2) header.edges.push_back({ends[k], ends[k + 1]});
-  }
-  const auto positive = [&](std::string_view name, double otherwise, bool may_be_zero) {
-    const std::optional<double> given = in.number(name);
-    if (given && !(may_be_zero ? *given >= 0 : *given > 0)) {
-      in.refuse(name, fmt::format("It is {}.", *given), may_be_zero ? "Write 0 or more." : "Write more than 0.");
-    }
-    return given.value_or(otherwise);
-  };
-  header.spacing = positive("spacing", 0, false);
-  header.damping = positive("damping", 0, true);
-  header.cut_resolution = positive("cut_resolution", 0, true);
-  header.u = positive("unit_roundoff", unit_roundoff(first.precision()), false);
-  header.steps = in.whole_number("steps").value_or(1);
-  if (header.steps < 1) in.refuse("steps", fmt::format("It is {}.", header.steps), "Write the substeps in a frame.");
-  if (const Array* const nodes = in.find("nodes", {n, 3})) {
-    header.spacing = header.spacing > 0 ? header.spacing : 1;
-    if (header.rest.empty()) {
-      const std::vector<double> coordinates = in.numbers(*nodes);
-      for (std::size_t k = 0; k < coordinates.size(); k += 3) {
-        header.rest.push_back(header.spacing * Vec3{coordinates[k], coordinates[k + 1], coordinates[k + 2]});
-      }
-    }
-  }
-  if (const std::string* const promises = find_text(contents, "promises")) header.promises = promises_of(in, *promises);
-  return header;
-}
-
-// Nothing where a segment has no coupling of its own: the one before goes on.
-std::optional<oracles::RunCoupling> coupling_of(const NamedArrays& in) {
-  if (!in.has("groups_offsets") && !in.has("groups_members") && !in.has("cells")) return std::nullopt;
-  oracles::RunCoupling coupling;
-  if (in.both("groups_offsets", "groups_members")) {
-    coupling.offsets = in.long_integers(in.require("groups_offsets", {-1}));
-    coupling.members = in.integers(in.require("groups_members", {-1}));
-    const auto members = std::ssize(coupling.members);
-    if (const Array* const weights = in.find("groups_weights", {members})) coupling.weights = in.numbers(*weights);
-  }
-  if (in.has("cells")) {
-    const Array& cells = in.require("cells", {-1, -1});
-    coupling.corners = static_cast<int>(cells.shape[1]);
-    if (coupling.corners != 4 && coupling.corners != 8) {
-      in.refuse("cells", fmt::format("They have {} corners.", coupling.corners), "Write tetrahedra or hexahedra.");
-    }
-    coupling.cells = in.integers(cells);
-  }
-  return coupling;
-}
-
-}  // namespace
-
-const std::vector<KnownArray>& run_arrays() {
-  static const std::vector<KnownArray> known = {
-      {"rest", "where particles are at rest [m]"},
-      {"mass", "of particles [kg]"},
-      {"gravity", "[m/s²]"},
-      {"spacing", "h [m]"},
-      {"steps", "substeps in a frame"},
-      {"damping", "c [1/s]: velocities decay as exp(-c t)"},
-      {"edges", "pairs of particles that are tissue"},
-      {"nodes", "integer coordinates at rest"},
-      {"cut_resolution", "how far a cut may lie beside the sweep [m]"},
-      {"unit_roundoff", "of the simulator's arithmetic"},
-      {"positions", "where particles are, frame by frame [m]"},
-      {"time", "of each frame [s]"},
-      {"velocities", "[m/s]"},
-      {"alive", "frame by frame, 1: the particle exists"},
-      {"held", "frame by frame, 1: its motion is prescribed"},
-      {"removed", "frame by frame, 1: a cut has taken it out"},
-      {"contact_impulse", "of each frame [kg m/s]"},
-      {"spin", "angular momentum that particles carry [kg m²/s]"},
-      {"energy", "of each frame [J]"},
-      {"blade", "patches that it sweeps in each frame"},
-      {"groups_offsets", "where each coupling group begins"},
-      {"groups_members", "particles, group by group"},
-      {"groups_weights", "of each member"},
-      {"cells", "corners of tetrahedra or hexahedra"},
-      {"parent", "which particle a new one was split from"},
-      {"piece", "the simulator's word on pieces"},
-      {"vertices", "of the skin [m]"},
-      {"triangles", "of the skin"},
-  };
-  return known;
-}
-
-const std::vector<KnownArray>& run_texts() {
-  static const std::vector<KnownArray> known = {{"promises", "what the run vouches for"}};
-  return known;
-}
 
 bool JudgedRun::holds() const {
   return verdicts.size() > 1 && std::all_of(verdicts.begin(), verdicts.end(), [](const Verdict& v) { return v.holds; });
@@ -270,33 +17,26 @@ JudgedRun judge_run(io::RunSegments& segments, const std::function<void(int64_t)
   JudgedRun judged;
   std::unique_ptr<oracles::RunJudge> judge;
   bool is_deterministic = false;
-  while (const std::optional<io::ArrayFile> contents = segments.next()) {
-    const NamedArrays in(*contents, segments.source(), run_arrays(), run_texts());
-    const Segment segment(in, judged.frames);
+  for (RunFrames frames(segments); frames.next();) {
+    const RunSegment& segment = frames.segment();
     if (!judge) {
-      const oracles::RunHeader header = header_of(in, *contents, segment);
-      is_deterministic = header.promised(RunPromise::deterministic);
+      const oracles::RunHeader header = segment.header();
+      is_deterministic = header.promised(oracles::RunPromise::deterministic);
       judge = std::make_unique<oracles::RunJudge>(header);
       judged.particles_at_start = segment.particles();
       judged.single_precision = segment.precision() == Precision::binary32;
     }
-    for (const Array& array : contents->arrays) judged.given.insert(array.name);
-    judged.notes.insert(judged.notes.end(), in.notes().begin(), in.notes().end());
-    if (const Array* const mass = in.find("mass", {segment.particles()})) {
-      std::vector<double> masses = in.numbers(*mass);
-      for (const double m : masses) {
-        if (!(m > 0)) in.refuse("mass", fmt::format("It holds {}.", m), "Write masses above 0, in kg.");
-      }
-      judge->weigh(std::move(masses));
+    if (frames.begins_segment()) {
+      for (const Array& array : segment.contents().arrays) judged.given.insert(array.name);
+      judged.notes.insert(judged.notes.end(), segment.arrays().notes().begin(), segment.arrays().notes().end());
+      if (std::optional<std::vector<double>> mass = segment.mass()) judge->weigh(std::move(*mass));
+      if (std::optional<oracles::RunCoupling> coupling = segment.coupling()) judge->couple(std::move(*coupling));
+      judged.particles_at_end = segment.particles();
+      ++judged.segments;
     }
-    if (std::optional<oracles::RunCoupling> coupling = coupling_of(in)) judge->couple(std::move(*coupling));
-    for (int64_t k = 0; k < segment.frames(); ++k) {
-      judge->see(segment.frame(k));
-      if (frame_done) frame_done(judged.frames + k);
-    }
-    judged.frames += segment.frames();
-    judged.particles_at_end = segment.particles();
-    ++judged.segments;
+    judge->see(frames.frame());
+    if (frame_done) frame_done(judged.frames);
+    ++judged.frames;
   }
   judge->finish();
   judged.verdicts = judge->verdicts();

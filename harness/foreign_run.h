@@ -6,15 +6,10 @@
 #include <vector>
 
 #include "harness/foreign_judge.h"
-#include "harness/named_arrays.h"
 #include "model/io/run_segments.h"
 #include "oracles/runs/run_judge.h"
 
 namespace cutproof::harness {
-
-// What a segment may hold. Of texts: `promises`.
-const std::vector<KnownArray>& run_arrays();
-const std::vector<KnownArray>& run_texts();
 
 struct JudgedRun {
   std::vector<Verdict> verdicts;
