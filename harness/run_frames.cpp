@@ -76,6 +76,7 @@ const std::vector<KnownArray>& run_arrays() {
       {"cells", "corners of tetrahedra or hexahedra"},
       {"parent", "which particle a new one was split from"},
       {"piece", "the simulator's word on pieces"},
+      {"permutation", "of each particle, which one of a related run it is"},
       {"vertices", "of the skin [m]"},
       {"triangles", "of the skin"},
   };

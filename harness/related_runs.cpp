@@ -1,0 +1,269 @@
+#include "harness/related_runs.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <unordered_map>
+#include <utility>
+
+#include "harness/run_frames.h"
+#include "model/at.h"
+#include "model/error.h"
+
+namespace cutproof::harness {
+
+namespace {
+
+using oracles::RelatedRun;
+using oracles::RunCoupling;
+
+// Times of one frame in two runs, relative: sums of steps round.
+constexpr double kSameTime = 1e-9;
+
+io::RunSegments open(const std::string& path) {
+  if (io::RunSegments::has_segments(path)) return io::RunSegments(path);
+  io::ArrayFile contents = io::read_array_file(path);
+  if (!io::RunSegments::is_segment(contents))
+    throw InputError(path, "positions", "This is no run.", "Write positions with the axes frame, particle and 3.");
+  return {path, std::move(contents)};
+}
+
+// One run where it is, with the coupling that holds.
+class OpenRun {
+ public:
+  explicit OpenRun(const std::string& path) : path_(path), segments_(open(path)), frames_(segments_) {}
+
+  bool next() {
+    if (!frames_.next()) return false;
+    is_new_coupling_ = false;
+    if (!frames_.begins_segment()) return true;
+    if (std::optional<RunCoupling> coupling = frames_.segment().coupling()) {
+      coupling_ = std::move(*coupling);
+      is_new_coupling_ = true;
+    }
+    if (std::optional<std::vector<double>> mass = frames_.segment().mass()) mass_ = std::move(*mass);
+    return true;
+  }
+  const std::string& path() const { return path_; }
+  const RunSegment& segment() const { return frames_.segment(); }
+  bool begins_segment() const { return frames_.begins_segment(); }
+  const std::vector<double>& mass() const { return mass_; }
+  RelatedRun where() const { return {frames_.frame(), coupling_ ? &*coupling_ : nullptr, is_new_coupling_}; }
+
+ private:
+  std::string path_;
+  io::RunSegments segments_;
+  RunFrames frames_;
+  std::optional<RunCoupling> coupling_;
+  std::vector<double> mass_;
+  bool is_new_coupling_ = false;
+};
+
+// Several bodies that were run alone, as one run: particles of the first, then of the next.
+class Together {
+ public:
+  explicit Together(const std::vector<std::unique_ptr<OpenRun>>& runs) : runs_(runs) {}
+
+  oracles::RunHeader header() const {
+    oracles::RunHeader all = runs_.front()->segment().header();
+    for (std::size_t k = 1; k < runs_.size(); ++k) {
+      const oracles::RunHeader more = runs_[k]->segment().header();
+      all.rest.insert(all.rest.end(), more.rest.begin(), more.rest.end());
+      all.u = std::max(all.u, more.u);
+    }
+    return all;
+  }
+  std::vector<double> mass() const {
+    std::vector<double> all;
+    for (const auto& run : runs_) all.insert(all.end(), run->mass().begin(), run->mass().end());
+    return all;
+  }
+  // Of the frames where they are; valid until the next call.
+  RelatedRun where() {
+    if (runs_.size() == 1) return runs_.front()->where();
+    RelatedRun all;
+    coupling_ = {};
+    coupling_.offsets = {0};
+    positions_.clear(), velocities_.clear(), spin_.clear(), blade_.clear();
+    exists_.clear();
+    bool is_coupled = true;
+    for (const auto& run : runs_) {
+      const RelatedRun one = run->where();
+      const auto shift = static_cast<int32_t>(std::ssize(positions_));
+      all.frame.index = one.frame.index;
+      all.frame.time = one.frame.time;
+      append(positions_, one.frame.positions), append(velocities_, one.frame.velocities);
+      append(spin_, one.frame.spin), append(blade_, one.frame.blade);
+      for (std::size_t i = 0; i < one.frame.positions.size(); ++i) {
+        exists_.push_back((one.frame.alive.empty() || one.frame.alive[i] != 0) &&
+                          (one.frame.removed.empty() || one.frame.removed[i] == 0));
+      }
+      all.is_new_coupling = all.is_new_coupling || one.is_new_coupling;
+      is_coupled = is_coupled && one.coupling != nullptr;
+      if (one.coupling != nullptr) append(coupling_, *one.coupling, shift);
+    }
+    all.frame.positions = positions_;
+    if (velocities_.size() == positions_.size()) all.frame.velocities = velocities_;
+    if (spin_.size() == positions_.size()) all.frame.spin = spin_;
+    all.frame.blade = blade_;
+    all.frame.alive = exists_;
+    if (is_coupled) all.coupling = &coupling_;
+    return all;
+  }
+
+ private:
+  static void append(std::vector<Vec3>& to, std::span<const Vec3> more) {
+    to.insert(to.end(), more.begin(), more.end());
+  }
+  static void append(RunCoupling& to, const RunCoupling& more, int32_t shift) {
+    const int64_t before = std::ssize(to.members);
+    for (std::size_t g = 1; g < more.offsets.size(); ++g) to.offsets.push_back(before + more.offsets[g]);
+    for (const int32_t i : more.members) to.members.push_back(i + shift);
+    for (const int32_t i : more.cells) to.cells.push_back(i + shift);
+    to.corners = more.corners;
+  }
+
+  const std::vector<std::unique_ptr<OpenRun>>& runs_;
+  std::vector<Vec3> positions_, velocities_, spin_, blade_;
+  std::vector<uint8_t> exists_;
+  RunCoupling coupling_;
+};
+
+struct HashOfPlace {
+  std::size_t operator()(Vec3 x) const {
+    std::size_t hash = 0;
+    for (int axis = 0; axis < 3; ++axis) hash = 31 * hash + std::hash<double>()(x[axis] + 0.0);  // -0 is 0
+    return hash;
+  }
+};
+
+// Of each particle of the second run, which one of the first it is: as it says, or by where it rests.
+std::vector<int32_t> permutation_of(const RunSegment& a, const RunSegment& b, const std::string& path) {
+  const int64_t n = b.particles();
+  if (const Array* const given = b.arrays().find("permutation", {n})) {
+    const std::vector<int32_t> was = b.arrays().integers(*given);
+    std::vector<uint8_t> taken(at(n));
+    for (const int32_t i : was) {
+      if (i < 0 || i >= n || taken[at(i)]++ != 0)
+        b.arrays().refuse("permutation", fmt::format("It names {} not once.", i), "Name each particle once.");
+    }
+    return was;
+  }
+  const std::vector<Vec3> rest = a.header().rest, mixed = b.header().rest;
+  if (rest.empty() || rest.size() != mixed.size())
+    throw InputError(path, "permutation", "Nothing says which particle is which.",
+                     "Write permutation, or rest in both.");
+  std::unordered_map<Vec3, int32_t, HashOfPlace> by_place;
+  for (std::size_t i = 0; i < rest.size(); ++i) {
+    if (!by_place.emplace(rest[i], static_cast<int32_t>(i)).second)
+      throw InputError(path, "permutation", fmt::format("Particle {} rests where another one does.", i),
+                       "Write permutation.");
+  }
+  std::vector<int32_t> was;
+  for (const Vec3 x : mixed) {
+    const auto found = by_place.find(x);
+    if (found == by_place.end())
+      throw InputError(path, "rest", "A particle rests where none of the first run does.", "Write permutation.");
+    was.push_back(found->second);
+    by_place.erase(found);
+  }
+  return was;
+}
+
+JudgedRelation judge_refinement(const RelatedFiles& files, const std::function<void(int64_t)>& frame_done) {
+  std::vector<std::unique_ptr<OpenRun>> runs;
+  runs.push_back(std::make_unique<OpenRun>(files.first));
+  for (const std::string& path : files.others) runs.push_back(std::make_unique<OpenRun>(path));
+  JudgedRelation judged;
+  std::optional<oracles::RunRefinement> refinement;
+  while (std::all_of(runs.begin(), runs.end(), [](const auto& run) { return run->next(); })) {
+    if (!refinement) {
+      std::vector<oracles::RunHeader> headers;
+      for (const auto& run : runs) {
+        headers.push_back(run->segment().header());
+        if (headers.size() > 1 && headers.back().steps <= headers[headers.size() - 2].steps)
+          run->segment().arrays().refuse("steps", "It has no more substeps in a frame than the run before.",
+                                         "Write steps, and give the coarsest run first.");
+      }
+      refinement.emplace(headers);
+      judged.particles = runs.front()->segment().particles();
+    }
+    std::vector<RelatedRun> now;
+    for (const auto& run : runs) now.push_back(run->where());
+    refinement->see(now);
+    if (frame_done) frame_done(judged.frames);
+    ++judged.frames;
+  }
+  judged.verdicts = refinement.value().verdicts();
+  judged.differences = refinement->differences();
+  return judged;
+}
+
+}  // namespace
+
+bool JudgedRelation::holds() const {
+  return std::all_of(verdicts.begin(), verdicts.end(), [](const Verdict& verdict) { return verdict.holds; });
+}
+
+JudgedRelation judge_relation(const oracles::RunMap& map, const RelatedFiles& files,
+                              const std::function<void(int64_t)>& frame_done) {
+  if (map.name() == "refine") return judge_refinement(files, frame_done);
+  OpenRun first(files.first);
+  std::vector<std::unique_ptr<OpenRun>> others, noise;
+  for (const std::string& path : files.others) others.push_back(std::make_unique<OpenRun>(path));
+  for (const std::string& path : files.noise) noise.push_back(std::make_unique<OpenRun>(path));
+  const auto all_next = [](const auto& runs) {
+    int64_t there = 0;
+    for (const auto& run : runs) there += run->next();
+    return there;
+  };
+  Together second(others);
+  std::optional<oracles::RunRelation> relation;
+  JudgedRelation judged;
+  for (bool has_mass = false;;) {
+    const bool in_first = first.next();
+    const int64_t in_others = all_next(others), in_noise = all_next(noise);
+    if (!relation) {
+      // A run that was loaded from a checkpoint begins in the middle of the first one.
+      while (map.name() == "checkpoint" && in_first && in_others > 0) {
+        const std::optional<double> time = first.where().frame.time, begins = others.front()->where().frame.time;
+        if (!time || !begins)
+          throw InputError(files.first, "time", "Nothing says when frames are.", "Write time in both.");
+        if (*time >= *begins - kSameTime * std::abs(*begins)) break;
+        if (!first.next())
+          throw InputError(others.front()->path(), "time", "It begins after the first run ends.",
+                           "Write a longer one.");
+        all_next(noise);
+      }
+      relation.emplace(map, first.segment().header(), second.header(), static_cast<int>(noise.size()), files.bits);
+      judged.particles = first.segment().particles();
+    }
+    const bool all = in_first && in_others == std::ssize(others) && in_noise == std::ssize(noise);
+    if (!all) {
+      if (in_first || in_others > 0 || in_noise > 0) relation->see_end_of_some(judged.frames);
+      break;
+    }
+    if (map.needs_time() && !first.where().frame.time)
+      throw InputError(files.first, "time", "A boost needs to know when frames are.", "Write time.");
+    if (map.name() == "permute" && others.front()->begins_segment() &&
+        (judged.frames == 0 || others.front()->segment().arrays().has("permutation")))
+      relation->permute(permutation_of(first.segment(), others.front()->segment(), others.front()->path()));
+    if (!has_mass) relation->weigh(first.mass(), second.mass());
+    has_mass = true;
+    std::vector<RelatedRun> disturbed;
+    for (const auto& run : noise) disturbed.push_back(run->where());
+    relation->see(first.where(), second.where(), disturbed);
+    if (frame_done) frame_done(judged.frames);
+    ++judged.frames;
+  }
+  relation->finish();
+  judged.verdicts = relation->verdicts();
+  judged.notes = relation->notes();
+  judged.sharpest = relation->sharpest();
+  return judged;
+}
+
+}  // namespace cutproof::harness

@@ -1,0 +1,32 @@
+// Runs that must correspond, read side by side (docs/reference/relate.md).
+#pragma once
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "model/verdict.h"
+#include "oracles/runs/run_relation.h"
+
+namespace cutproof::harness {
+
+struct RelatedFiles {
+  std::string first;
+  std::vector<std::string> others;  // one; of `split` each body alone; of `refine` two or more
+  std::vector<std::string> noise;   // runs of the first that were disturbed in each frame
+  bool bits = false;                // the bits must be the same, too
+};
+
+struct JudgedRelation {
+  std::vector<Verdict> verdicts;
+  std::vector<std::string> notes;
+  int64_t frames = 0, particles = 0;
+  oracles::RelationSharpness sharpest;
+  std::vector<double> differences;  // of `refine`: of each run from the next [m]
+  bool holds() const;
+};
+
+// Throws InputError where a file cannot be understood, or where a map needs what is not there.
+JudgedRelation judge_relation(const oracles::RunMap& map, const RelatedFiles& files,
+                              const std::function<void(int64_t frame)>& frame_done = {});
+
+}  // namespace cutproof::harness
