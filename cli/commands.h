@@ -18,6 +18,7 @@ using Work = std::function<int()>;
 void add_run(CLI::App& program, Work& work);
 void add_check(CLI::App& program, Work& work);
 void add_kick(CLI::App& program, Work& work);
+void add_relate(CLI::App& program, Work& work);
 void add_fuzz(CLI::App& program, Work& work);
 void add_replay(CLI::App& program, Work& work);
 void add_bench(CLI::App& program, Work& work);

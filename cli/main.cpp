@@ -67,8 +67,8 @@ int run_command_line(int argc, char** argv) {
   app.set_version_flag("--version", std::string("cutproof ") + kVersion);
   app.require_subcommand(1);
   Work work;
-  for (const auto add : {add_run, add_judge, add_check, add_kick, add_vectors, add_check_vectors, add_info, add_bench,
-                         add_tune, add_fuzz, add_replay, add_report, add_digest})
+  for (const auto add : {add_run, add_judge, add_check, add_kick, add_relate, add_vectors, add_check_vectors, add_info,
+                         add_bench, add_tune, add_fuzz, add_replay, add_report, add_digest})
     add(app, work);
   AskedStyle asked_style;
   add_style(app, asked_style);

@@ -1,5 +1,5 @@
 """Runs of the simulators in guests/examples/runs, judged by the program: right ones hold, and each fault that one run
-shows fails the property that is named here.
+shows fails the property that is named here, each that two runs show a relation.
 
 The environment names the program (CUTPROOF).
 """
@@ -35,6 +35,11 @@ FAULTS = {
     "inverted": {"tetrahedra": "no inverted cell"},
 }
 
+# By fault that only a second run shows: the map that shows it, and of springs the property that has to fail.
+RELATED = {"units": ("units:4,4,16", "related positions"), "mirror": ("mirror:x", "related coupling"),
+           "reset": ("reset", "related coupling"), "race": ("same", "same bits")}
+DIMENSIONS = ("stiffness=-1,-2,1", "frame_time=0,1,0", "kerf=1,0,0")
+
 
 class Runs(unittest.TestCase):
     def setUp(self):
@@ -55,6 +60,27 @@ class Runs(unittest.TestCase):
                               text=True)
         self.assertIn(done.returncode, (0, 1), done.stderr)
         return done.returncode, json.loads(document.read_text()), done.stdout
+
+    def relate(self, *arguments):
+        document = self.folder / "related.json"
+        done = subprocess.run([os.environ["CUTPROOF"], "relate", *arguments, "--json", document], capture_output=True,
+                              text=True)
+        self.assertIn(done.returncode, (0, 1), done.stderr)
+        return done.returncode, json.loads(document.read_text()), done.stdout
+
+    def related(self, simulator, word, *options, noise=(), bits=False):
+        """Two runs that must correspond by this map, made as a user would."""
+        scene, image = self.folder / "scene.npz", self.folder / "image.npz"
+        first = self.simulate(simulator, "first.h5", "--frames", "12", "--save-scene", scene, *options)
+        second = ["--again"] if word == "reset" else ["--frames", "12"]
+        if ":" in word or word == "permute":
+            subprocess.run([os.environ["CUTPROOF"], "relate", "--make", word, scene, image,
+                            *(f"--dimension={each}" for each in DIMENSIONS)], check=True, stdout=subprocess.DEVNULL)
+            second += ["--scene", image]
+        other = self.simulate(simulator, "second.h5", "--frames", "12", *second, *options)
+        disturbed = [self.simulate(simulator, f"noise{seed}.h5", "--frames", "12", "--disturb", seed) for seed in noise]
+        return self.relate(first, other, "--map", word, *(["--bits"] if bits else []),
+                           *(["--noise", *disturbed] if noise else []))
 
     def failed(self, document):
         return [verdict["property"] for verdict in document["verdicts"] if not verdict["holds"]]
@@ -77,6 +103,46 @@ class Runs(unittest.TestCase):
                     status, document, _ = self.check(self.simulate(simulator, "run.h5", "--fault", fault))
                     self.assertEqual(status, 1)
                     self.assertIn(wanted, self.failed(document))
+
+    def test_right_simulators_keep_every_relation(self):
+        for simulator in SIMULATORS:
+            for word in ("same", "reset", "units:4,4,16", "units:1000,1,0.001", "mirror:x", "rotate:90z"):
+                with self.subTest(simulator=simulator, map=word):
+                    keeps_bits = word in ("same", "reset", "units:4,4,16")
+                    status, document, text = self.related(simulator, word, bits=keeps_bits)
+                    self.assertEqual(status, 0, text)
+                    self.assertIn("related coupling", [verdict["property"] for verdict in document["verdicts"]])
+        status, _, text = self.related("springs", "permute", noise=("1", "2"))
+        self.assertEqual(status, 0, text)
+
+    def test_faults_of_two_runs_fail_the_relation_that_is_named(self):
+        for fault, (word, wanted) in RELATED.items():
+            with self.subTest(fault=fault):
+                status, document, text = self.related("springs", word, "--fault", fault, bits=wanted == "same bits")
+                self.assertEqual(status, 1, text)
+                self.assertIn(wanted, self.failed(document), text)
+        # A right run beside one whose square roots are of single precision: as a GPU beside its CPU.
+        right = self.simulate("springs", "first.h5", "--frames", "12")
+        rough = self.simulate("springs", "second.h5", "--frames", "12", "--fault", "noise")
+        noise = [self.simulate("springs", f"noise{seed}.h5", "--frames", "12", "--disturb", seed) for seed in "12"]
+        status, document, text = self.relate(right, rough, "--map", "same", "--noise", *noise)
+        self.assertEqual(status, 1, text)
+        self.assertIn("related positions", self.failed(document))
+        self.assertGreater(document["sharpest"]["moved"], 1e10 * document["sharpest"]["bound"])
+
+    def test_finer_steps_converge(self):
+        runs = []
+        for steps in (10, 20, 40):
+            scene, finer = self.folder / "scene.npz", self.folder / "finer.npz"
+            self.simulate("springs", "plain.h5", "--frames", "4", "--save-scene", scene)
+            numpy.savez(finer, **{**numpy.load(scene), "steps": steps})
+            runs.append(self.simulate("springs", f"{steps}.h5", "--frames", "4", "--scene", finer))
+        status, document, text = self.relate(*runs, "--map", "refine")
+        self.assertEqual(status, 0, text)
+        self.assertGreater(document["differences"][0], 1.8 * document["differences"][1])
+        other = self.simulate("springs", "other.h5", "--frames", "4", "--scene", finer, "--fault", "spin_lost")
+        status, document, text = self.relate(*runs[:2], other, "--map", "refine")
+        self.assertEqual((status, self.failed(document)), (1, ["converges"]), text)
 
     def test_forms_of_a_file_have_the_same_verdicts(self):
         told = []
