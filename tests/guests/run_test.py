@@ -115,7 +115,7 @@ class Runs(unittest.TestCase):
         status, _, text = self.related("springs", "permute", noise=("1", "2"))
         self.assertEqual(status, 0, text)
 
-    def test_faults_of_two_runs_fail_the_relation_that_is_named(self):
+    def test_faults_fail_the_relation_that_is_named(self):
         for fault, (word, wanted) in RELATED.items():
             with self.subTest(fault=fault):
                 status, document, text = self.related("springs", word, "--fault", fault, bits=wanted == "same bits")
