@@ -6,6 +6,7 @@ The environment names the program (CUTPROOF).
 import json
 import os
 import pathlib
+import resource
 import subprocess
 import sys
 import tempfile
@@ -158,6 +159,36 @@ class Runs(unittest.TestCase):
                 run.frame(x + 0.01 * frame, velocities=numpy.ones((5, 3)), time=0.01 * frame, groups=[[0, 1, 2, 3, 4]])
         status, document, text = self.check(path)
         self.assertEqual((status, document["run"]["frames"]), (0, 3), text)
+
+    def test_a_large_run_is_judged_as_it_is_read(self):
+        """97,336 particles, whose springs change in each tenth frame, in two gigabytes (ci/nightly.sh: 1,000 frames)."""
+        side, frames, h, dt = 46, 1000 if os.environ.get("CUTPROOF_WHOLE") == "1" else 100, 0.01, 0.005
+        number = numpy.arange(side**3).reshape(side, side, side)
+        springs = numpy.concatenate([numpy.stack([a.ravel(), b.ravel()], 1) for a, b in (
+            (number[:-1], number[1:]), (number[:, :-1], number[:, 1:]), (number[:, :, :-1], number[:, :, 1:]))])
+        rest = h * numpy.stack(numpy.unravel_index(numpy.arange(side**3), number.shape), 1)
+        plane, top, gravity = h * (side // 2 - 0.5), h * side, numpy.array([0, 0, -9.81])
+        crosses = numpy.ptp(rest[springs, 0] < plane, axis=1)
+        height, low, whole = rest[springs, 2].min(1), top, numpy.ones(len(springs), bool)
+        with cutproof_run.Writer(self.folder / "run.h5", rest=rest, mass=numpy.ones(len(rest)), spacing=h, steps=4,
+                                 gravity=gravity, edges=springs, promises="free", unit_roundoff=2.0**-24,
+                                 flush=1) as run:
+            for f in range(frames):
+                fallen, more = gravity * (f * dt)**2 / 2, {}
+                if f % 10 == 0:
+                    if 0 < f <= 0.9 * frames:
+                        was, low = low + 0.1 * h, top - (top + h) * f / (0.9 * frames)
+                        more["blade"] = [[[plane, -h, was], [plane, top, was], [plane, top, low],
+                                          [plane, -h, low]]] + fallen
+                    whole &= ~(crosses & (height >= low))
+                    more["groups"] = numpy.arange(0, 2 * whole.sum() + 1, 2), springs[whole].ravel()
+                run.frame((rest + fallen).astype(numpy.float32), time=f * dt, **more,
+                          velocities=numpy.broadcast_to(gravity * f * dt, rest.shape).astype(numpy.float32))
+        limit = resource.getrlimit(resource.RLIMIT_AS)
+        resource.setrlimit(resource.RLIMIT_AS, (2 << 30, limit[1]))
+        self.addCleanup(resource.setrlimit, resource.RLIMIT_AS, limit)
+        status, document, text = self.check(self.folder / "run.h5")
+        self.assertEqual((status, document["pieces"]["sizes"]), (0, [side**3 // 2] * 2), text)
 
     def test_what_does_not_fit_is_refused_by_name(self):
         x = numpy.zeros((2, 4, 3))
