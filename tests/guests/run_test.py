@@ -168,7 +168,7 @@ class Runs(unittest.TestCase):
             (number[:-1], number[1:]), (number[:, :-1], number[:, 1:]), (number[:, :, :-1], number[:, :, 1:]))])
         rest = h * numpy.stack(numpy.unravel_index(numpy.arange(side**3), number.shape), 1)
         plane, top, gravity = h * (side // 2 - 0.5), h * side, numpy.array([0, 0, -9.81])
-        crosses = numpy.ptp(rest[springs, 0] < plane, axis=1)
+        crosses = numpy.diff(rest[springs, 0] < plane, axis=1)[:, 0]
         height, low, whole = rest[springs, 2].min(1), top, numpy.ones(len(springs), bool)
         with cutproof_run.Writer(self.folder / "run.h5", rest=rest, mass=numpy.ones(len(rest)), spacing=h, steps=4,
                                  gravity=gravity, edges=springs, promises="free", unit_roundoff=2.0**-24,
