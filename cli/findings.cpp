@@ -189,8 +189,9 @@ std::vector<Failure> failures_of_campaign(const json& document, const std::strin
   return failures;
 }
 
-void write_junit(const std::string& path, const Judging& judging, double seconds, std::vector<JunitCase> cases) {
-  write_output(path, io::junit_xml({{judging.suite, seconds, std::move(cases)}}));
+void write_junit(const std::string& path, const Judging& judging, double seconds, std::vector<JunitCase> cases,
+                 std::vector<std::pair<std::string, std::string>> properties) {
+  write_output(path, io::junit_xml({{judging.suite, seconds, std::move(cases), std::move(properties)}}));
 }
 
 }  // namespace cutproof::cli

@@ -3,6 +3,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "cli/annotations.h"
@@ -38,7 +39,8 @@ std::vector<Failure> failures_of(const std::vector<Verdict>& verdicts, const Jud
 std::vector<Failure> failures_of_campaign(const nlohmann::json& document, const std::string& failure,
                                           const Judging& judging);
 
-// A file of one suite; nothing if `path` is empty.
-void write_junit(const std::string& path, const Judging& judging, double seconds, std::vector<io::JunitCase> cases);
+// A file of one suite, with properties of the whole; nothing if `path` is empty.
+void write_junit(const std::string& path, const Judging& judging, double seconds, std::vector<io::JunitCase> cases,
+                 std::vector<std::pair<std::string, std::string>> properties = {});
 
 }  // namespace cutproof::cli

@@ -93,6 +93,13 @@ std::string junit_xml(const std::vector<JunitSuite>& suites) {
     seconds += suite.seconds;
     body += fmt::format("  <testsuite{}{}{}>\n", attribute("name", suite.name), counts.attributes(),
                         time_attribute(suite.seconds));
+    if (!suite.properties.empty()) {
+      body += "    <properties>\n";
+      for (const auto& [name, value] : suite.properties) {
+        body += fmt::format("      <property{}{}/>\n", attribute("name", name), attribute("value", value));
+      }
+      body += "    </properties>\n";
+    }
     for (const JunitCase& one : suite.cases) {
       body += fmt::format("    <testcase{}{}{}>{}</testcase>\n", attribute("name", one.name),
                           attribute("classname", one.class_name), time_attribute(one.seconds), inside(one));

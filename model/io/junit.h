@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace cutproof::io {
@@ -25,11 +26,12 @@ struct JunitSuite {
   std::string name;
   double seconds = 0;  // wall time of all cases together
   std::vector<JunitCase> cases = {};
+  std::vector<std::pair<std::string, std::string>> properties = {};  // names and values, of the suite as a whole
 };
 
-// A document in UTF-8: <testsuites> of <testsuite> of <testcase>, with the attributes tests, failures, errors, skipped
-// and time of each suite and of all. What XML 1.0 cannot hold (control characters, bytes that are not UTF-8) is
-// replaced by U+FFFD.
+// A document in UTF-8: <testsuites> of <testsuite> of <properties> and <testcase>, with the attributes tests, failures,
+// errors, skipped and time of each suite and of all. What XML 1.0 cannot hold (control characters, bytes that are not
+// UTF-8) is replaced by U+FFFD.
 std::string junit_xml(const std::vector<JunitSuite>& suites);
 
 }  // namespace cutproof::io

@@ -44,7 +44,7 @@ TEST(Junit, CountsWhatItHolds) {
         {"d", "c", 0, JunitOutcome::failed, "is wrong, too"},
         {"e", "c", 0, JunitOutcome::skipped, "vacuous"}}},
       {"second", 2, {{"a", "c", 0, JunitOutcome::error, "lost"}, {"p", "c", 0, JunitOutcome::passed, "", "note"}}},
-      {"third", 0}};
+      {"third", 0, {}, {{"felt / kicked", "4e-09"}, {"<\"&", "\n"}}}};
   const std::string read = as_python_reads(junit_xml(suites));
   EXPECT_TRUE(has(read, "testsuites errors='1' failures='2' skipped='1' tests='6' time='3.500000'")) << read;
   EXPECT_TRUE(has(read, "testsuite errors='0' failures='2' name='first' skipped='1' tests='4' time='1.500000'"));
@@ -55,6 +55,8 @@ TEST(Junit, CountsWhatItHolds) {
   EXPECT_TRUE(has(read, "skipped message='vacuous' ''"));
   EXPECT_TRUE(has(read, "error message='lost' ''"));
   EXPECT_TRUE(has(read, "system-out 'note'"));
+  EXPECT_TRUE(has(read, "property name='felt / kicked' value='4e-09'"));
+  EXPECT_TRUE(has(read, "property name='<\"&' value='\\n'"));
 }
 
 TEST(Junit, KeepsEveryCharacterThatXmlCanHold) {
