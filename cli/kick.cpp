@@ -1,8 +1,9 @@
-// `cutproof kick`: whether a kick of one piece is felt by another, of a simulator that is known by its positions alone.
+// `cutproof kick`: whether kicks of a piece are felt by another, of a simulator that is known by its positions alone.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <memory>
+#include <utility>
 
 #include "cli/commands.h"
 #include "cli/findings.h"
@@ -12,6 +13,7 @@
 #include "cli/table.h"
 #include "cli/terminal.h"
 #include "harness/recorded_kick.h"
+#include "model/at.h"
 #include "model/io/array_file.h"
 #include "model/io/json_number.h"
 #include "model/io/verdict_json.h"
@@ -34,11 +36,14 @@ std::vector<std::string> notes_of(const oracles::KickReport& report, const harne
     notes.push_back("Without again, the simulator is taken to repeat itself to the last bit.");
   } else if (!report.repeats) {
     std::string note = "The simulator does not repeat itself, so the test is blunt";
-    if (report.sharpest_frame >= 0) {
+    const auto bluntest = std::max_element(
+        report.kicks.begin(), report.kicks.end(),
+        [](const oracles::KickAnswer& a, const oracles::KickAnswer& b) { return a.least_bound < b.least_bound; });
+    if (bluntest != report.kicks.end() && bluntest->sharpest_frame >= 0) {
       note += fmt::format(
           ": a push of less than {:.3g} m passes in frame {}, where it is sharpest and the kicked piece "
           "is off by {:.3g} m",
-          report.least_bound, report.sharpest_frame, report.kick_then);
+          bluntest->least_bound, bluntest->sharpest_frame, bluntest->kick_then);
     }
     notes.push_back(note + ".");
     if (report.judged_frames < runs.frames) {
@@ -49,58 +54,115 @@ std::vector<std::string> notes_of(const oracles::KickReport& report, const harne
                       report.judged_frames));
     }
   }
+  if (runs.tolerance > 0) {
+    notes.push_back(fmt::format("Other pieces may feel {:g} of a kick: tolerance.", runs.tolerance));
+  }
   return notes;
+}
+
+nlohmann::json figure_or_null(bool there, double value) { return there ? json_number(value) : nlohmann::json(); }
+nlohmann::json index_or_null(int64_t value) { return value >= 0 ? nlohmann::json(value) : nlohmann::json(); }
+
+nlohmann::json to_json(const harness::RecordedKick& kick, std::size_t number, const oracles::KickAnswer& answer) {
+  const bool was_felt = answer.kick_frame >= 0;
+  nlohmann::json pieces = nlohmann::json::array();
+  for (const oracles::KickedPiece& piece : answer.pieces) {
+    const bool timed = piece.first_frame >= 0 && !kick.time.empty();
+    pieces.push_back({{"piece", piece.piece},
+                      {"particles", piece.particles},
+                      {"felt", piece.felt},
+                      {"greatest", json_number(piece.greatest)},
+                      {"centre", json_number(piece.centre)},
+                      {"of_kick", figure_or_null(was_felt, piece.of_kick)},
+                      {"first_frame", index_or_null(piece.first_frame)},
+                      {"first_time", figure_or_null(timed, timed ? kick.time[at(piece.first_frame)] : 0)}});
+  }
+  const oracles::KickedRun& run = kick.runs.kicks[number];
+  nlohmann::json direction;
+  if (run.direction) direction = {run.direction->x, run.direction->y, run.direction->z};
+  const bool sharp = answer.sharpest_frame >= 0;
+  return {{"direction", direction},
+          {"equal", index_or_null(run.equal)},
+          {"kicked_piece", answer.kicked_piece ? nlohmann::json(*answer.kicked_piece) : nlohmann::json()},
+          {"kick_frame", index_or_null(answer.kick_frame)},
+          {"least_bound", figure_or_null(sharp, answer.least_bound)},
+          {"sharpest_frame", index_or_null(answer.sharpest_frame)},
+          {"kick_then", figure_or_null(sharp, answer.kick_then)},
+          {"pieces", pieces}};
 }
 
 nlohmann::json to_json(const KickOptions& options, const harness::RecordedKick& kick,
                        const oracles::KickReport& report) {
-  const auto figure_of = [](bool there, double value) { return there ? json_number(value) : nlohmann::json(); };
-  nlohmann::json pieces = nlohmann::json::array();
-  for (const oracles::KickedPiece& piece : report.pieces) {
-    nlohmann::json entry = {{"piece", piece.piece},
-                            {"particles", piece.particles},
-                            {"felt", piece.felt},
-                            {"greatest", json_number(piece.greatest)}};
-    entry["first_frame"] = piece.first_frame >= 0 ? nlohmann::json(piece.first_frame) : nlohmann::json();
-    const bool timed = piece.first_frame >= 0 && !kick.time.empty();
-    entry["first_time"] = figure_of(timed, timed ? kick.time[static_cast<std::size_t>(piece.first_frame)] : 0);
-    pieces.push_back(std::move(entry));
+  nlohmann::json kicks = nlohmann::json::array(), verdicts = io::verdicts_json(report.verdicts);
+  for (std::size_t k = 0; k < report.kicks.size(); ++k) {
+    kicks.push_back(to_json(kick, k, report.kicks[k]));
+    for (nlohmann::json verdict : io::verdicts_json(report.kicks[k].verdicts)) {
+      verdict["kick"] = k;
+      verdicts.push_back(std::move(verdict));
+    }
   }
-  const auto failed = std::count_if(report.verdicts.begin(), report.verdicts.end(),
-                                    [](const Verdict& verdict) { return !verdict.holds; });
-  const bool sharp = report.sharpest_frame >= 0;
+  const auto failed =
+      std::count_if(verdicts.begin(), verdicts.end(), [](const auto& verdict) { return !verdict.at("holds"); });
   return {{"format", "cutproof.kick"},
-          {"format_version", 1},
+          {"format_version", 2},
           {"cutproof", kVersion},
           {"source", options.file},
           {"frames", kick.runs.frames},
           {"particles", kick.runs.particles},
-          {"kicked_piece", report.kicked_piece ? nlohmann::json(*report.kicked_piece) : nlohmann::json()},
-          {"kick_frame", report.kick_frame >= 0 ? nlohmann::json(report.kick_frame) : nlohmann::json()},
           {"repeats", kick.runs.again.empty() ? nlohmann::json() : nlohmann::json(report.repeats)},
           {"judged_frames", report.judged_frames},
-          {"least_bound", figure_of(sharp, report.least_bound)},
-          {"sharpest_frame", sharp ? nlohmann::json(report.sharpest_frame) : nlohmann::json()},
-          {"kick_then", figure_of(sharp, report.kick_then)},
-          {"pieces", pieces},
-          {"verdicts", io::verdicts_json(report.verdicts)},
-          {"summary", {{"holds", report.holds()}, {"verdicts", report.verdicts.size()}, {"failed", failed}}},
+          {"tolerance", kick.runs.tolerance},
+          {"kicks", kicks},
+          {"verdicts", verdicts},
+          {"summary", {{"holds", report.holds()}, {"verdicts", verdicts.size()}, {"failed", failed}}},
           {"notes", notes_of(report, kick)}};
 }
 
+bool was_kicked(const oracles::KickAnswer& answer, const oracles::KickedPiece& piece) {
+  return answer.kicked_piece && piece.piece == *answer.kicked_piece;
+}
+
 void print_pieces(const harness::RecordedKick& kick, const oracles::KickReport& report) {
-  if (report.pieces.empty()) return;
-  Table table({"piece", "particles", "felt it", "greatest [m]", "from frame"});
-  for (const oracles::KickedPiece& piece : report.pieces) {
-    std::string from = piece.first_frame < 0 ? "-" : fmt::format("{}", piece.first_frame);
-    if (piece.first_frame >= 0 && !kick.time.empty()) {
-      from += fmt::format(" ({:.4g} s)", kick.time[static_cast<std::size_t>(piece.first_frame)]);
+  if (report.kicks.empty()) return;
+  const bool several = report.kicks.size() > 1;
+  std::vector<std::string> head = {"piece",      "particles",     "felt it",   "greatest [m]",
+                                   "centre [m]", "felt / kicked", "from frame"};
+  if (several) head.insert(head.begin(), "kick");
+  Table table(head);
+  for (std::size_t k = 0; k < report.kicks.size(); ++k) {
+    const oracles::KickAnswer& answer = report.kicks[k];
+    for (const oracles::KickedPiece& piece : answer.pieces) {
+      std::string from = piece.first_frame < 0 ? "-" : fmt::format("{}", piece.first_frame);
+      if (piece.first_frame >= 0 && !kick.time.empty()) {
+        from += fmt::format(" ({:.4g} s)", kick.time[at(piece.first_frame)]);
+      }
+      const bool other = answer.kick_frame >= 0 && !was_kicked(answer, piece);
+      if (was_kicked(answer, piece)) from += ", kicked";
+      std::vector<std::string> row = {fmt::format("{}", piece.piece),
+                                      fmt::format("{}", piece.particles),
+                                      fmt::format("{}", piece.felt),
+                                      fmt::format("{:.4g}", piece.greatest),
+                                      fmt::format("{:.4g}", piece.centre),
+                                      other ? fmt::format("{:.2g}", piece.of_kick) : "-",
+                                      from};
+      if (several) row.insert(row.begin(), fmt::format("{}", k));
+      table.add(std::move(row));
     }
-    if (report.kicked_piece && piece.piece == *report.kicked_piece) from += ", kicked";
-    table.add({fmt::format("{}", piece.piece), fmt::format("{}", piece.particles), fmt::format("{}", piece.felt),
-               fmt::format("{:.4g}", piece.greatest), from});
   }
-  say_as_it_is("\n" + table.text());
+  say_as_it_is("\n" + table.text(several ? 2 : 1));
+}
+
+// "felt / kicked": of each kick and each other piece.
+std::vector<std::pair<std::string, std::string>> shares_of(const oracles::KickReport& report) {
+  std::vector<std::pair<std::string, std::string>> shares;
+  for (std::size_t k = 0; k < report.kicks.size(); ++k) {
+    for (const oracles::KickedPiece& piece : report.kicks[k].pieces) {
+      if (report.kicks[k].kick_frame < 0 || was_kicked(report.kicks[k], piece)) continue;
+      shares.emplace_back(fmt::format("felt / kicked, kick {}, piece {}", k, piece.piece),
+                          fmt::format("{:.3g}", piece.of_kick));
+    }
+  }
+  return shares;
 }
 
 int kick(const KickOptions& options) {
@@ -108,18 +170,20 @@ int kick(const KickOptions& options) {
   require_writable(options.json);
   require_writable(options.junit);
   const oracles::KickReport report = oracles::judge_kick(kick.runs);
+  const std::vector<Verdict> verdicts = report.all();
   write_document(options.json, to_json(options, kick, report));
   const Judging judging{"cutproof kick", "cutproof.kick", options.again};
-  write_junit(options.junit, judging, 0, cases_of(report.verdicts, judging));
-  say("kick {}: {} frames of {} particles\n", options.file, kick.runs.frames, kick.runs.particles);
+  write_junit(options.junit, judging, 0, cases_of(verdicts, judging), shares_of(report));
+  say("kick {}: {} frames of {} particles{}\n", options.file, kick.runs.frames, kick.runs.particles,
+      kick.runs.kicks.size() > 1 ? fmt::format(", {} kicks", kick.runs.kicks.size()) : "");
   print_pieces(kick, report);
   Shown shown{options.again};
   shown.in_frames = false;
-  print_verdicts(report.verdicts, shown);
+  print_verdicts(verdicts, shown);
   print_notes(notes_of(report, kick));
   print_written(options.json);
-  print_conclusion(report.verdicts, shown, "what was judged holds.");
-  print_annotations(failures_of(report.verdicts, judging));
+  print_conclusion(verdicts, shown, "what was judged holds.");
+  print_annotations(failures_of(verdicts, judging));
   return report.holds() ? 0 : 1;
 }
 
@@ -127,8 +191,8 @@ int kick(const KickOptions& options) {
 
 void add_kick(CLI::App& program, Work& work) {
   const auto options = std::make_shared<KickOptions>();
-  CLI::App* const command = program.add_subcommand("kick", "judge whether a kick of one piece moves another");
-  command->add_option("file", options->file, "NPZ or HDF5: the same simulation with and without a kick")
+  CLI::App* const command = program.add_subcommand("kick", "judge whether kicks of one piece move another");
+  command->add_option("file", options->file, "NPZ or HDF5: the same simulation with and without kicks")
       ->required()
       ->type_name("FILE");
   add_json(*command, options->json, "write verdicts and what became of each piece");

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "model/io/array_file.h"
@@ -111,11 +112,12 @@ TEST_F(Foreign, KickOfTheGuideHoldsAndAGhostForceDoesNot) {
   EXPECT_EQ(outcome.status, 0) << outcome.output;
   json document = json::parse(read("kick.json"));
   EXPECT_EQ(document.at("format"), "cutproof.kick");
-  EXPECT_EQ(document.at("kicked_piece"), 1);
-  EXPECT_EQ(document.at("kick_frame"), 10);
   EXPECT_TRUE(document.at("repeats"));
-  EXPECT_EQ(document.at("pieces").at(1).at("felt"), 4);
-  EXPECT_TRUE(document.at("pieces").at(0).at("first_frame").is_null());
+  ASSERT_EQ(document.at("kicks").size(), 1u);
+  EXPECT_EQ(document["kicks"][0].at("kicked_piece"), 1);
+  EXPECT_EQ(document["kicks"][0].at("kick_frame"), 10);
+  EXPECT_EQ(document["kicks"][0].at("pieces").at(1).at("felt"), 4);
+  EXPECT_TRUE(document["kicks"][0].at("pieces").at(0).at("first_frame").is_null());
   EXPECT_TRUE(document.at("summary").at("holds"));
 
   python(replaced(right, "x[10:, 4:, 1] += kick", "x[10:, 4:, 1] += kick; x[12:, 3, 1] += 1e-6 * kick"));
@@ -124,8 +126,9 @@ TEST_F(Foreign, KickOfTheGuideHoldsAndAGhostForceDoesNot) {
   EXPECT_NE(outcome.output.find("particle 3 of piece 0 felt it first, from frame 12 on"), std::string::npos)
       << outcome.output;
   document = json::parse(read("kick.json"));
-  EXPECT_EQ(document.at("pieces").at(0).at("felt"), 1);
-  EXPECT_EQ(document.at("pieces").at(0).at("first_frame"), 12);
+  EXPECT_EQ(document["kicks"][0].at("pieces").at(0).at("felt"), 1);
+  EXPECT_EQ(document["kicks"][0].at("pieces").at(0).at("first_frame"), 12);
+  EXPECT_NEAR(document["kicks"][0].at("pieces").at(0).at("of_kick"), 1e-6, 1e-12);
   EXPECT_EQ(entry(document.at("verdicts"), "no ghost force").at("witness").at("particles"), json({3}));
 
   python(replaced(right, "run(0.01)", "run(0)"));
@@ -140,7 +143,41 @@ TEST_F(Foreign, KickOfTheGuideHoldsAndAGhostForceDoesNot) {
   EXPECT_NE(outcome.output.find("the test is blunt"), std::string::npos) << outcome.output;
   document = json::parse(read("kick.json"));
   EXPECT_FALSE(document.at("repeats"));
-  EXPECT_GT(document.at("least_bound").get<double>(), 1e-8);
+  EXPECT_GT(document["kicks"][0].at("least_bound").get<double>(), 1e-8);
+}
+
+TEST_F(Foreign, KicksAreToldOneByOne) {
+  const std::string one = replaced(programs_of_the_guide().at(1), "x[10:, 4:, 1] += kick",
+                                   "x[10:, 4:, 1] += kick; x[10:, :4, 1] += 4e-9 * kick");
+  const std::string program = replaced(one, "kicked=run(0.01)", "kicked=[run(0.01), run(-0.02)]");
+  python(replaced(program, "piece=", "tolerance=1e-6, directions=[[0, 1, 0], [0, -1, 0]], piece="));
+  Outcome outcome = cutproof("kick kick.npz --json kick.json --junit kick.xml");
+  EXPECT_EQ(outcome.status, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("30 frames of 8 particles, 2 kicks"), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find("8e-11   4e-09"), std::string::npos) << outcome.output;
+  EXPECT_NE(on_one_line(outcome.output).find("Not judged: equal answers"), std::string::npos) << outcome.output;
+  const json document = json::parse(read("kick.json"));
+  EXPECT_EQ(document.at("tolerance"), 1e-6);
+  ASSERT_EQ(document.at("kicks").size(), 2u);
+  for (const json& each : document["kicks"]) {
+    EXPECT_EQ(each.at("kicked_piece"), 1);
+    EXPECT_NEAR(each.at("pieces").at(0).at("of_kick").get<double>(), 4e-9, 1e-20);
+  }
+  EXPECT_EQ(document["kicks"][1].at("direction"), json({0.0, -1.0, 0.0}));
+  EXPECT_NEAR(document["kicks"][1].at("pieces").at(1).at("centre").get<double>(), 0.02, 1e-12);
+  std::map<std::string, int> of_each;
+  for (const json& verdict : document.at("verdicts")) of_each[verdict.contains("kick") ? "one" : "all"] += 1;
+  EXPECT_EQ(of_each["all"], 2);
+  EXPECT_EQ(of_each["one"], 6);
+  EXPECT_NE(read("kick.xml").find("<property name=\"felt / kicked, kick 1, piece 0\" value=\"4e-09\"/>"),
+            std::string::npos)
+      << read("kick.xml");
+
+  python(program);
+  outcome = cutproof("kick kick.npz");
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_NE(on_one_line(outcome.output).find("global coupling, 4e-09 of the kick"), std::string::npos)
+      << outcome.output;
 }
 
 // A run of the reference, cut, as NPZ and as HDF5, as a graph and on a grid.

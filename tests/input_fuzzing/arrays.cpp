@@ -55,10 +55,18 @@ io::ArrayFile small_graph() {
 io::ArrayFile small_kick() {
   io::ArrayFile file;
   const std::vector<int64_t> shape = {2, 2, 3};
-  std::vector<double> run(12, 0.0), kicked(12, 0.0);
-  kicked[9] = 1;
-  file.arrays = {make_array("positions", shape, run), make_array("kicked", shape, kicked),
-                 make_array("again", shape, run), make_array("piece", {2}, std::vector<int32_t>{0, 1}),
+  std::vector<double> run(12, 0.0), kicked(24, 0.0);
+  kicked[9] = kicked[22] = 1;  // along x, and along y
+  file.arrays = {make_array("positions", shape, run),
+                 make_array("kicked", {2, 2, 2, 3}, kicked),
+                 make_array("again", shape, run),
+                 make_array("piece", {2}, std::vector<int32_t>{0, 1}),
+                 make_array("kicked_piece", {2}, std::vector<int32_t>{1, 1}),
+                 make_array("directions", {2, 3}, std::vector<double>{1, 0, 0, 0, 1, 0}),
+                 make_array("equal", {2}, std::vector<int32_t>{0, 0}),
+                 make_array("tolerance", {}, std::vector<double>{1e-6}),
+                 make_array("mass", {2}, std::vector<double>{1, 2}),
+                 make_array("steps", {}, std::vector<int32_t>{1}),
                  make_array("time", {2}, std::vector<double>{0, 1})};
   return file;
 }
