@@ -8,7 +8,7 @@ SPDX-License-Identifier: MIT
         cutproof.judge(rotations=my_function)       # my_function(a, previous) -> r
 
 `judge` asks your function many hard questions and raises Failed, with the smallest case that it could find, where an
-answer is wrong. It needs Linux, numpy and the program `cutproof`: in the environment variable CUTPROOF, beside this
+answer is wrong. `kick` judges a whole simulator by where its particles were with and without a kick of one piece. It needs Linux, numpy and the program `cutproof`: in the environment variable CUTPROOF, beside this
 file, or in PATH. What each function gets and returns: docs/reference/python.md.
 
 This process answers questions that the program asks over a socket; arrays lie in memory that both map. The layouts
@@ -18,6 +18,7 @@ import ctypes
 import json
 import mmap
 import os
+import re
 import shutil
 import socket
 import subprocess
@@ -28,11 +29,11 @@ import unittest
 
 import numpy
 
-__all__ = ["judge", "replay", "Failed", "Skipped", "Refused", "Error", "Result", "Tissue", "DeviceArray"]
+__all__ = ["judge", "replay", "kick", "Failed", "Skipped", "Refused", "Error", "Result", "Tissue", "DeviceArray"]
 
 
 class Failed(AssertionError):
-    """An answer was wrong, or nothing was judged. `document`: what `cutproof judge --json` writes; None of a replay."""
+    """An answer was wrong, or nothing was judged. `document`: what `cutproof --json` writes; None of a replay."""
 
     def __init__(self, text, document=None):
         super().__init__(text)
@@ -548,16 +549,16 @@ def _find_program():
 
 
 class Result:
-    """Everything holds. `operations`: by name, with the fields of docs/reference/results_schema.md; `document`: the
-    whole; `text`: what the program printed."""
+    """Everything holds. `operations`: of judge, by name, with the fields of docs/reference/results_schema.md;
+    `document`: the whole; `text`: what the program printed."""
 
     def __init__(self, text, document=None):
         self.text, self.document = text, document
-        self.operations = {each["operation"]: each for each in document["operations"]} if document else {}
+        self.operations = {each["operation"]: each for each in (document or {}).get("operations", ())}
 
     def __repr__(self):
-        counts = (f"{name}: {each['cases']} {each['of']}" for name, each in self.operations.items())
-        return f"<cutproof.Result: all hold ({', '.join(counts) or 'a replay'})>"
+        counts = ", ".join(f"{name}: {each['cases']} {each['of']}" for name, each in self.operations.items())
+        return f"<cutproof.Result: all hold{counts and f' ({counts})'}>"
 
 
 def judge(*, rotations=None, components=None, surface=None, clusters=None, cases=None, sizes=None, seconds=None, seed=1,
@@ -611,6 +612,34 @@ def replay(file, *, rotations=None, components=None, surface=None, clusters=None
     if status != 0:
         raise Failed("\n".join([output, *guest.tracebacks.values()]))
     return Result(output)
+
+
+def kick(positions, kicked, piece, **arrays):
+    """Whether a kick of one piece moves another. Returns, and raises, as judge does.
+
+    positions (f, n, 3): where particles were, frame by frame, in m. kicked (f, n, 3): the same with a kick of one piece;
+    or a list of such runs. piece (n): which particles belong together. arrays: again, alive, kicked_piece, directions,
+    equal, tolerance, mass, steps, spacing, time: docs/reference/foreign_state.md, A kick.
+    """
+    __tracebackhide__ = True
+    return _judge_arrays("kick", kick=dict(arrays, positions=positions, kicked=kicked, piece=piece))
+
+
+def _judge_arrays(verb, **files):
+    """Of `cutproof VERB NAME.npz ...`, each file with its arrays by name."""
+    __tracebackhide__ = True
+    program = os.path.abspath(_find_program())
+    with tempfile.TemporaryDirectory(prefix="cutproof") as folder:
+        for name, arrays in files.items():
+            numpy.savez(os.path.join(folder, name), **{key: array for key, array in arrays.items() if array is not None})
+        done = subprocess.run([program, verb, *(f"{name}.npz" for name in files), "--json=-"], cwd=folder,
+                              stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace")
+    text = re.sub(r"\n*see it again: .*", "", done.stderr.strip())  # the files are gone
+    _raise_unless_judged(done.returncode, text)
+    document = json.loads(done.stdout)
+    if done.returncode != 0:
+        raise Failed(text, document)
+    return Result(text, document)
 
 
 def _given(**functions):
