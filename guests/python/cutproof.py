@@ -622,20 +622,25 @@ def kick(positions, kicked, piece, **arrays):
     equal, tolerance, mass, steps, spacing, time: docs/reference/foreign_state.md, A kick.
     """
     __tracebackhide__ = True
-    return _judge_arrays("kick", kick=dict(arrays, positions=positions, kicked=kicked, piece=piece))
+    return _judge_arrays(["kick", "kick.npz"], kick=dict(arrays, positions=positions, kicked=kicked, piece=piece))
 
 
-def _judge_arrays(verb, **files):
-    """Of `cutproof VERB NAME.npz ...`, each file with its arrays by name."""
+def _judge_arrays(words, **files):
+    """Of `cutproof` with these words, in a folder with NAME.npz for each file: its arrays by name."""
     __tracebackhide__ = True
     program = os.path.abspath(_find_program())
     with tempfile.TemporaryDirectory(prefix="cutproof") as folder:
         for name, arrays in files.items():
             numpy.savez(os.path.join(folder, name), **{key: array for key, array in arrays.items() if array is not None})
-        done = subprocess.run([program, verb, *(f"{name}.npz" for name in files), "--json=-"], cwd=folder,
-                              stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace")
+        try:
+            done = subprocess.run([program, *words, "--json=-"], cwd=folder, stdin=subprocess.DEVNULL,
+                                  capture_output=True, text=True, errors="replace")
+        except OSError as error:
+            raise Error(f"cutproof cannot be started: {error}") from error
     text = re.sub(r"\n*see it again: .*", "", done.stderr.strip())  # the files are gone
     _raise_unless_judged(done.returncode, text)
+    if not done.stdout:
+        raise Error("the program has judged nothing: is it cutproof?")
     document = json.loads(done.stdout)
     if done.returncode != 0:
         raise Failed(text, document)

@@ -334,7 +334,7 @@ Verdict the_kick_was_felt(const Differences& differences, const KickReport& repo
   return verdict;
 }
 
-// Any body yields to a push by itself: at first its centre goes to the side to which it was pushed.
+// A body that is pushed as a whole yields, held or not: at first its centre goes to the side to which it was pushed.
 Verdict answer_follows(const Differences& differences, const KickAnswer& answer, const CentreAnswer& centre) {
   Verdict verdict = kick_verdict("the answer follows the kick", "tolerances.md, The answer to a kick", "degrees");
   verdict.checked = 1;

@@ -2,9 +2,11 @@
 
 The environment names the program (CUTPROOF).
 """
+import os
 import pathlib
 import sys
 import unittest
+import unittest.mock
 
 import numpy as np
 
@@ -161,6 +163,12 @@ class Arrays(unittest.TestCase):
         self.assertEqual(failed(caught.exception.document), {"the kick was felt"})
         self.assertIn("nothing was tested", str(caught.exception))
         self.assertNotIn("see it again", str(caught.exception))
+
+    def test_another_program_is_an_error(self):
+        x = np.zeros((1, 2, 3))
+        with unittest.mock.patch.dict(os.environ, CUTPROOF="true"):
+            with self.assertRaisesRegex(cutproof.Error, "is it cutproof"):
+                cutproof.kick(x, x, [0, 1])
 
     def test_a_result_says_that_all_holds(self):
         x = np.zeros((2, 2, 3))
