@@ -47,6 +47,14 @@ constexpr double kBetween = 2;
 bool is_number(Vec3 x) { return std::isfinite(x.x) && std::isfinite(x.y) && std::isfinite(x.z); }
 bool is_blank(Vec3 x) { return std::isnan(x.x) && std::isnan(x.y) && std::isnan(x.z); }
 
+// A sum of many. In double precision each addition of equal numbers may round the same way, by more in all than bounds
+// allow.
+struct WideSum {
+  long double x = 0, y = 0, z = 0;
+  void operator+=(Vec3 a) { x += a.x, y += a.y, z += a.z; }
+  operator Vec3() const { return {static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)}; }
+};
+
 // A property of runs, by Which. `needs`: what a run has to have so that it is asked.
 struct RunProperty {
   const char *name, *unit, *source, *needs;
@@ -365,22 +373,25 @@ class RunJudge::Implementation {
     if (is_held && !frame.contact_impulse) return;
     const double dt = *frame.time - *time_was_, dt_s = dt / static_cast<double>(header_.steps);
     const Vec3 gravity = header_.gravity.value_or(Vec3{}), impulse = frame.contact_impulse.value_or(Vec3{});
-    double mass = 0, squares = 0, farthest = 0;
-    Vec3 p, p_was, x, x_was;
+    long double mass_sum = 0;
+    double squares = 0, farthest = 0;
+    WideSum p_sum, p_was_sum, x_sum, x_was_sum;
     for (std::size_t i = 0; i < exists_.size(); ++i) {
       if (exists_[i] != 0) farthest = std::max({farthest, norm(frame.positions[i]), norm(was_[i])});
     }
     for (std::size_t i = 0; i < exists_.size(); ++i) {
       if (exists_[i] == 0) continue;
       const double m = mass_[i];
-      mass += m;
-      p += m * frame.velocities[i];
-      p_was += m * velocity_was_[i];
-      x += m * frame.positions[i];
-      x_was += m * was_[i];
+      mass_sum += m;
+      p_sum += m * frame.velocities[i];
+      p_was_sum += m * velocity_was_[i];
+      x_sum += m * frame.positions[i];
+      x_was_sum += m * was_[i];
       const double rounds = norm(frame.velocities[i]) + norm(velocity_was_[i]) + kStable * farthest / dt_s;
       squares += m * rounds * m * rounds;
     }
+    const Vec3 p = p_sum, p_was = p_was_sum, x = x_sum, x_was = x_was_sum;
+    const auto mass = static_cast<double>(mass_sum);
     const double steps = static_cast<double>(header_.steps), decay = header_.damping * dt;
     const double rounding = kDeviations * header_.u * std::sqrt(steps * squares);
     // A scheme damps by (1 - c dt / S)^S, its inverse, or between: (c dt)² off the exponential at most, and what is
@@ -407,18 +418,19 @@ class RunJudge::Implementation {
   }
 
   void angular(const RunFrame& frame, Vec3 x, Vec3 x_was, Vec3 v, Vec3 v_was, double rounding, double farthest) {
-    Vec3 spins, spins_was;
+    WideSum spins_sum, spins_was_sum;
     double size = 0;
     for (std::size_t i = 0; i < exists_.size(); ++i) {
       if (exists_[i] == 0) continue;
       const double m = mass_[i];
       const Vec3 arm = frame.positions[i] - x, was = was_[i] - x_was;
-      spins += m * cross(arm, frame.velocities[i] - v);
-      spins_was += m * cross(was, velocity_was_[i] - v_was);
-      if (!frame.spin.empty()) spins += frame.spin[i];
-      if (!spin_was_.empty()) spins_was += spin_was_[i];
+      spins_sum += m * cross(arm, frame.velocities[i] - v);
+      spins_was_sum += m * cross(was, velocity_was_[i] - v_was);
+      if (!frame.spin.empty()) spins_sum += frame.spin[i];
+      if (!spin_was_.empty()) spins_was_sum += spin_was_[i];
       size += m * norm(arm) * norm(frame.velocities[i] - v);
     }
+    const Vec3 spins = spins_sum, spins_was = spins_was_sum;
     const double off = norm(spins - spins_was);
     if (header_.promised(RunPromise::angular_momentum)) {
       const double decay = header_.damping * *frame.time - header_.damping * *time_was_;
@@ -435,8 +447,9 @@ class RunJudge::Implementation {
   // Vertices that are split share the mass of the one that they come from.
   void masses() {
     if (!is_new_mass_ || std::ssize(mass_) != n_) return;
-    double mass = 0;
-    for (const double m : mass_) mass += m;
+    long double sum = 0;
+    for (const double m : mass_) sum += m;
+    const auto mass = static_cast<double>(sum);
     if (mass_was_) {
       const double off = std::abs(mass - *mass_was_);
       if (!within(kMass, off, kDeviations * header_.u * std::sqrt(static_cast<double>(n_)) * *mass_was_))

@@ -123,6 +123,46 @@ TEST(RunJudge, HoldsOfABarThatIsPartedByItsBlade) {
 }
 
 // Two tetrahedra share a face, whatever the order of their corners.
+// What the judge's own sums round is no fault of a run.
+TEST(RunJudge, HoldsOfManyParticles) {
+  constexpr double kDt = 0.01;
+  RunHeader header;
+  header.gravity = Vec3{0, 0, -10};
+  header.promises = 1u << static_cast<int>(RunPromise::free) | 1u << static_cast<int>(RunPromise::angular_momentum);
+  std::vector<Vec3> x, v(100'000, {0.3, -0.7, 1.1});
+  std::vector<double> mass(v.size(), 0.1);
+  for (int k = 0; k < 100'000; ++k) x.push_back({1 + 0.001 * (k % 50), 2 + 0.001 * (k / 50 % 50), 0.001 * (k / 2500)});
+  RunJudge judge(header);
+  judge.weigh(mass);
+  for (int f = 0; f < 6; ++f) {
+    for (std::size_t k = 0; f == 3 && k < 100'000; k += 10) {  // some are split
+      mass[k] /= 2;
+      for (auto* const numbers : {&x, &v}) numbers->push_back((*numbers)[k]);
+      mass.push_back(mass[k]);
+    }
+    if (f == 3) judge.weigh(mass);
+    RunFrame frame;
+    frame.index = f;
+    frame.time = f * kDt;
+    frame.positions = x;
+    frame.velocities = v;
+    judge.see(frame);
+    for (std::size_t k = 0; k < x.size(); ++k) {
+      v[k] += kDt * *header.gravity;
+      x[k] += kDt * v[k];
+    }
+  }
+  judge.finish();
+  std::string judged;
+  for (const Verdict& verdict : judge.verdicts()) {
+    judged += verdict.property + ", ";
+    EXPECT_TRUE(verdict.holds) << verdict.property << ": " << verdict.witness.text;
+  }
+  EXPECT_EQ(judged,
+            "run well formed, finite, what is gone stays gone, no teleport, linear momentum, centre of mass, angular "
+            "momentum, mass kept, ");
+}
+
 TEST(RunJudge, KnowsTheFacesThatCellsShare) {
   const std::vector<Vec3> x = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 1}};
   for (const auto& other : {std::array{1, 2, 3, 4}, std::array{4, 3, 2, 1}, std::array{3, 1, 2, 4}}) {
