@@ -217,8 +217,12 @@ TEST_F(Libraries, PolarDecompositionOfBulletIsNoneOfMomentsInSiUnits) {
 
 class OfBullet : public Libraries {
  protected:
+  void simulate(const std::string& what, const std::string& how, const std::string& name) const {
+    const std::string words = what + " " + how + " '" + path(name) + "'";
+    EXPECT_EQ(std::system(("'" EXAMPLE_bullet_soft_body "' " + words).c_str()), 0) << words;
+  }
   json kicked(const std::string& kMT, int status) const {
-    EXPECT_EQ(std::system(("'" EXAMPLE_bullet_soft_body "' " + kMT + " '" + path("kick.npz") + "'").c_str()), 0);
+    simulate("kick", kMT, "kick.npz");
     const Outcome outcome = cutproof("kick kick.npz --json kick.json");
     EXPECT_EQ(outcome.status, status) << outcome.output;
     return json::parse(read("kick.json"));
@@ -251,6 +255,37 @@ TEST_F(OfBullet, PieceFeelsNothingWithoutACommonShape) {
   EXPECT_EQ(pieces[0].at("felt"), 116);
   EXPECT_EQ(pieces[1].at("particles"), 103);
   EXPECT_EQ(pieces[1].at("felt"), 0);
+}
+
+// What couples nodes of a sheet that is cut, and the properties of its run that fail.
+struct CutSheet {
+  const char* coupling;
+  std::vector<std::string> failing;
+};
+class OfBulletRun : public OfBullet, public testing::WithParamInterface<CutSheet> {};
+INSTANTIATE_TEST_SUITE_P(, OfBulletRun,
+                         testing::Values(CutSheet{"links", {}}, CutSheet{"shape", {"no coupling across pieces"}},
+                                         CutSheet{"clusters_after", {"no coupling across pieces"}},
+                                         CutSheet{"clusters_before", {"run well formed"}}),
+                         [](const auto& test) { return std::string(test.param.coupling); });
+
+TEST_P(OfBulletRun, FailsWhereSomethingGoesAcrossTheCut) {
+  NEEDS(EXAMPLE_bullet_soft_body, "libbullet-dev")
+  simulate("run", GetParam().coupling, "run");
+  const Outcome outcome = cutproof("check run --json run.json");
+  EXPECT_EQ(outcome.status, GetParam().failing.empty() ? 0 : 1) << outcome.output;
+  const json found = json::parse(read("run.json"));
+  std::vector<std::string> judged, failing;
+  for (const json& verdict : found.at("verdicts")) {
+    judged.push_back(verdict.at("property"));
+    if (!verdict.at("holds")) failing.push_back(verdict.at("property"));
+  }
+  EXPECT_EQ(failing, GetParam().failing) << outcome.output;
+  if (failing == std::vector<std::string>{"run well formed"}) return;  // nothing else means anything
+  EXPECT_EQ(found.at("pieces").at("sizes"), json({91, 78}));
+  for (const char* const property : {"pieces coupled within", "linear momentum", "centre of mass", "mass kept"}) {
+    EXPECT_NE(std::find(judged.begin(), judged.end(), property), judged.end()) << property;
+  }
 }
 
 #ifdef CUTPROOF_HAS_BULLET
@@ -302,6 +337,38 @@ TEST_F(OfBullet, ShapeMadeBeforeACutHasFewerEntriesThanThereAreNodes) {
   body->refine(&plane, 0.001f, true);
   EXPECT_EQ(body->m_pose.m_pos.size(), 169);
   EXPECT_EQ(body->m_nodes.size(), 219);
+#endif
+}
+
+// Tissue that is under tension when it is cut does not retract.
+TEST_F(OfBullet, CutMakesTheLengthsOfThatMomentThoseAtRest) {
+#ifndef CUTPROOF_HAS_BULLET
+  NEEDS("", "libbullet-dev")
+#else
+  btSoftBodyWorldInfo world;
+  world.m_gravity.setZero();
+  const auto body = sheet(world);
+  const auto stretch = [&] {
+    float rest = 0, length = 0;
+    for (int k = 0; k < body->m_links.size(); ++k) {
+      const btSoftBody::Link& link = body->m_links[k];
+      rest += link.m_rl;
+      length += (link.m_n[0]->m_x - link.m_n[1]->m_x).length();
+    }
+    return length / rest;
+  };
+  body->predictMotion(1 / 60.f);
+  for (int i = 0; i < body->m_nodes.size(); ++i) {
+    btSoftBody::Node& node = body->m_nodes[i];
+    node.m_x.setX(1.5f * node.m_x.x());
+    node.m_q = node.m_x;
+  }
+  body->predictMotion(1 / 60.f);
+  EXPECT_GT(stretch(), 1.25f);
+  Plane plane;
+  body->refine(&plane, 0.001f, true);
+  body->predictMotion(1 / 60.f);
+  EXPECT_NEAR(stretch(), 1, 1e-5);
 #endif
 }
 
