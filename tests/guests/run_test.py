@@ -42,17 +42,13 @@ RELATED = {"units": ("units:4,4,16", "related positions"), "mirror": ("mirror:x"
 DIMENSIONS = ("stiffness=-1,-2,1", "frame_time=0,1,0", "kerf=1,0,0")
 
 
-class Runs(unittest.TestCase):
+class JudgedRuns(unittest.TestCase):
+    """What tests of runs share: a folder, and the program's word on a run."""
+
     def setUp(self):
         folder = tempfile.TemporaryDirectory(prefix="cutproof_runs_")
         self.addCleanup(folder.cleanup)
         self.folder = pathlib.Path(folder.name)
-
-    def simulate(self, simulator, name="run.h5", *options):
-        path = self.folder / name
-        subprocess.run(["/usr/bin/python3", "-B", ROOT / f"guests/examples/runs/{simulator}.py", path, *options],
-                       check=True, stdout=subprocess.DEVNULL)
-        return path
 
     def check(self, path):
         """The exit status and the document."""
@@ -85,6 +81,14 @@ class Runs(unittest.TestCase):
 
     def failed(self, document):
         return [verdict["property"] for verdict in document["verdicts"] if not verdict["holds"]]
+
+
+class Runs(JudgedRuns):
+    def simulate(self, simulator, name="run.h5", *options):
+        path = self.folder / name
+        subprocess.run(["/usr/bin/python3", "-B", ROOT / f"guests/examples/runs/{simulator}.py", path, *options],
+                       check=True, stdout=subprocess.DEVNULL)
+        return path
 
     def test_right_simulators_hold(self):
         for simulator in SIMULATORS:
