@@ -4,7 +4,7 @@
 # Usage: ci/install.sh [--list] [GROUP...]
 #   tests       what the tests need; those that need a browser or VTK are skipped without that group
 #   browser     Chromium, in which tests/report/ opens report pages
-#   libraries   VTK, which tests/guests/libraries_test.cpp judges
+#   libraries   VTK, which tests/guests/libraries_test.cpp judges, and packages of npm, which javascript_test.py does
 #   package     what ci/package.sh needs
 #   fuzzing     what ci/input_fuzzing.sh needs beside the tests
 #   --list      prints the packages instead
@@ -29,6 +29,7 @@ tests=(
 )
 browser=(chromium chromium-driver python3-selenium)
 libraries=(libvtk9.1)
+command -v npm >/dev/null || libraries+=(nodejs npm)  # a Node.js from elsewhere brings its own npm
 fuzzing=(clang libclang-rt-dev llvm)  # llvm adds file and line to the reports of sanitizers
 
 list=no
@@ -56,7 +57,12 @@ done
 # libvtk9-dev would bring 212 packages, a Java and an MPI among them. Its headers are enough, beside the libraries.
 headers=no
 [[ " $* " != *" libraries "* ]] || [ -d build/libraries/usr/include/vtk-9.1 ] || headers=yes
-[ ${#missing[@]} -gt 0 ] || [ "$headers" = yes ] || exit 0
+engines() {
+  [[ " $* " == *" libraries "* ]] || return 0
+  cd guests/examples/javascript
+  [ ! package-lock.json -nt node_modules ] || npm ci --ignore-scripts --no-audit --no-fund --loglevel=error
+}
+[ ${#missing[@]} -gt 0 ] || [ "$headers" = yes ] || { engines "$@"; exit 0; }
 
 as_root=()
 if [ "$(id -u)" -ne 0 ]; then
@@ -73,3 +79,4 @@ if [ "$headers" = yes ]; then
   mkdir -p build/libraries
   (cd build/libraries && apt-get download -qq -o APT::Sandbox::User=root libvtk9-dev && dpkg -x libvtk9-dev_*.deb .)
 fi
+engines "$@"
