@@ -29,7 +29,7 @@ import unittest
 
 import numpy
 
-__all__ = ["judge", "replay", "kick", "Failed", "Skipped", "Refused", "Error", "Result", "Tissue", "DeviceArray"]
+__all__ = ["judge", "replay", "kick", "relate", "mapped", "Failed", "Skipped", "Refused", "Error", "Result", "Tissue", "DeviceArray"]
 
 
 class Failed(AssertionError):
@@ -625,20 +625,56 @@ def kick(positions, kicked, piece, **arrays):
     return _judge_arrays(["kick", "kick.npz"], kick=dict(arrays, positions=positions, kicked=kicked, piece=piece))
 
 
-def _judge_arrays(words, **files):
-    """Of `cutproof` with these words, in a folder with NAME.npz for each file: its arrays by name."""
+def relate(first, *others, map="same", noise=(), bits=False):
+    """Whether runs of one simulator correspond as their inputs do. Returns, and raises, as judge does.
+
+    first, others, noise: runs, each a dict of the arrays of docs/reference/run.md, or the path of a file. map, noise,
+    bits: docs/reference/relate.md.
+    """
     __tracebackhide__ = True
-    program = os.path.abspath(_find_program())
+    runs, files, words = (first, *others, *noise), {}, []
+    for k, run in enumerate(runs):
+        if isinstance(run, dict):
+            files[f"run{k}"] = run
+        words.append(f"run{k}.npz" if isinstance(run, dict) else os.path.abspath(run))
+    count = 1 + len(others)
+    return _judge_arrays(["relate", *words[:count], "--map", map, *(["--noise", *words[count:]] if noise else []),
+                          *(["--bits"] if bits else [])], **files)
+
+
+def mapped(map, arrays, **dimensions):
+    """The input that corresponds to this one, a dict of arrays, by a map of docs/reference/relate.md.
+
+    dimensions: of arrays that docs/reference/run.md does not name, the powers of length, time and mass: (-1, -2, 1), or
+    with how a vector follows: (1, -1, 0, "velocity").
+    """
+    words = ["relate", "--make", map, "given.npz", "mapped.npz"]
+    words += [f"--dimension={name}={','.join(str(each) for each in powers)}" for name, powers in dimensions.items()]
     with tempfile.TemporaryDirectory(prefix="cutproof") as folder:
-        for name, arrays in files.items():
-            numpy.savez(os.path.join(folder, name), **{key: array for key, array in arrays.items() if array is not None})
-        try:
-            done = subprocess.run([program, *words, "--json=-"], cwd=folder, stdin=subprocess.DEVNULL,
-                                  capture_output=True, text=True, errors="replace")
-        except OSError as error:
-            raise Error(f"cutproof cannot be started: {error}") from error
+        _run_in(folder, words, given=arrays)
+        with numpy.load(os.path.join(folder, "mapped.npz")) as made:
+            return dict(made)
+
+
+def _run_in(folder, words, **files):
+    """`cutproof` with these words where each file lies as NAME.npz: its arrays by name."""
+    __tracebackhide__ = True
+    for name, arrays in files.items():
+        numpy.savez(os.path.join(folder, name), **{key: array for key, array in arrays.items() if array is not None})
+    try:
+        done = subprocess.run([os.path.abspath(_find_program()), *words], cwd=folder, stdin=subprocess.DEVNULL,
+                              capture_output=True, text=True, errors="replace")
+    except OSError as error:
+        raise Error(f"cutproof cannot be started: {error}") from error
     text = re.sub(r"\n*see it again: .*", "", done.stderr.strip())  # the files are gone
     _raise_unless_judged(done.returncode, text)
+    return done, text
+
+
+def _judge_arrays(words, **files):
+    __tracebackhide__ = True
+    with tempfile.TemporaryDirectory(prefix="cutproof") as folder:
+        done, text = _run_in(folder, [*words, "--json=-"], **files)
     if not done.stdout:
         raise Error("the program has judged nothing: is it cutproof?")
     document = json.loads(done.stdout)

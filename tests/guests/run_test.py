@@ -16,6 +16,7 @@ import numpy
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT / "guests" / "python"))
+import cutproof  # noqa: E402
 import cutproof_run  # noqa: E402
 
 SIMULATORS = ("springs", "tetrahedra", "material_points", "clusters")
@@ -134,6 +135,34 @@ class Runs(JudgedRuns):
         self.assertEqual(status, 1, text)
         self.assertIn("related positions", self.failed(document))
         self.assertGreater(document["sharpest"]["moved"], 1e10 * document["sharpest"]["bound"])
+
+    def test_relations_of_arrays_in_memory(self):
+        scene = {"rest": numpy.random.default_rng(1).random((6, 3)), "gravity": numpy.array([0, 0, -9.81]),
+                 "velocities": numpy.ones((6, 3)), "mass": numpy.ones(6), "drag": numpy.array(0.5)}
+
+        def simulate(scene, constant=0.0):
+            dt, drag = 0.01 * (4 if scene["mass"][0] > 1 else 1), scene["drag"] + constant
+            x, v, frames = scene["rest"], scene["velocities"], []
+            for _ in range(8):
+                frames.append((x, v))
+                v = v + dt * (scene["gravity"] - drag * v)
+                x = x + dt * v
+            return dict(scene, positions=numpy.array([f[0] for f in frames]), time=dt * numpy.arange(8), drag=None,
+                        velocities=numpy.array([f[1] for f in frames]))
+
+        scaled = cutproof.mapped("units:4,4,16", scene, drag=(0, -1, 0))
+        self.assertEqual((scaled["drag"], scaled["mass"][0]), (0.125, 16))
+        result = cutproof.relate(simulate(scene), simulate(scaled), map="units:4,4,16", bits=True)
+        self.assertEqual(result.document["frames"], 8)
+        with self.assertRaises(cutproof.Failed) as caught:
+            cutproof.relate(simulate(scene, 0.1), simulate(scaled, 0.1), map="units:4,4,16")
+        self.assertEqual(self.failed(caught.exception.document), ["related positions", "related velocities"])
+        with self.assertRaisesRegex(cutproof.Error, "drag"):
+            cutproof.mapped("units:4,4,16", scene)
+        noisy = simulate(scene)
+        noisy["positions"] = noisy["positions"] * (1 + 1e-16)
+        with self.assertRaisesRegex(cutproof.Failed, "noise is there"):
+            cutproof.relate(simulate(scene), simulate(scene), noise=[noisy])
 
     def test_finer_steps_converge(self):
         runs = []
