@@ -164,6 +164,35 @@ class Runs(JudgedRuns):
         with self.assertRaisesRegex(cutproof.Failed, "noise is there"):
             cutproof.relate(simulate(scene), simulate(scene), noise=[noisy])
 
+    def test_bodies_alone_and_a_run_that_goes_on_correspond(self):
+        random = numpy.random.default_rng(2)
+        x, time = random.random((6, 5, 3)).cumsum(0), 0.1 * numpy.arange(6)
+        both = dict(positions=x, time=time, groups_offsets=[0, 2, 5], groups_members=[0, 1, 2, 3, 4])
+        one = dict(positions=x[:, :2], time=time, groups_offsets=[0, 2], groups_members=[0, 1])
+        other = dict(positions=x[:, 2:], time=time, groups_offsets=[0, 3], groups_members=[0, 1, 2])
+        later = dict(both, positions=x[2:], time=time[2:])
+        self.assertEqual(cutproof.relate(both, one, other, map="split", bits=True).document["frames"], 6)
+        self.assertEqual(cutproof.relate(both, later, map="checkpoint", bits=True).document["frames"], 4)
+
+        def failures(*runs, map):
+            with self.assertRaises(cutproof.Failed) as caught:
+                cutproof.relate(*runs, map=map)
+            return self.failed(caught.exception.document)
+
+        self.assertEqual(failures(both, other, one, map="split"), ["related positions", "related coupling"])
+        self.assertEqual(failures(both, dict(other, groups_members=[0, 1, 1]), map="split"), ["related frames"])
+        wrong = dict(later, positions=x[2:] + [[[0, 0, 1e-9]]])
+        self.assertEqual(failures(both, wrong, map="checkpoint"), ["related positions"])
+        self.assertEqual(failures(both, dict(later, positions=x[2:5], time=time[2:5]), map="checkpoint"),
+                         ["related frames"])
+        for runs, map, words in (((both, later), "shift", "no map"), ((both, one), "refine", "3 or more"),
+                                 ((both, dict(later, time=None)), "checkpoint", "Write time"),
+                                 ((both, both), "permute", "which particle is which"),
+                                 ((both, dict(both, permutation=[0, 1, 2, 2, 4])), "permute", "Name each particle once"),
+                                 ((both, dict(later, time=later["time"] + 9)), "checkpoint", "Write a longer one")):
+            with self.subTest(map=map, words=words), self.assertRaisesRegex(cutproof.Error, words):
+                cutproof.relate(*runs, map=map)
+
     def test_finer_steps_converge(self):
         runs = []
         for steps in (10, 20, 40):
