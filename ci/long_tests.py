@@ -12,7 +12,7 @@ import re
 import subprocess
 import sys
 
-SHARE = 16
+SHARE = 32
 LONG = (
     (r"Independent\.TrajectoriesAndOrders", "a step that program and reference both have wrong; orders of convergence"),
     (r"Packaging\.(subdirectory|archive)", "that others' projects can build with the libraries, as folder or package"),
