@@ -246,7 +246,7 @@ TEST_F(Options, AreOfferedByBash) {
   write("a scene.json", kScene);
   files::create_directory(folder_ / "afolder");
   for (const auto& [words, offered] :
-       std::vector<std::pair<std::string, std::string>>{{"cutproof r", "run replay report"},
+       std::vector<std::pair<std::string, std::string>>{{"cutproof r", "run relate replay report"},
                                                         {"cutproof run --fr", "--frames"},
                                                         {"cutproof run --backend host-", "host-blocks"},
                                                         {"cutproof run --backend = sim", "simulated"},
