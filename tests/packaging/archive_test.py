@@ -70,6 +70,16 @@ def judge(options, root, name):
     expect(built.returncode == 0, f"{name}: the tutorial's simulator does not build: {built.stdout}")
     done = run([program, "run", "three_cuts", "--backend", "plugin:./libsplitter.so", "--check"], **surroundings)
     expect(done.returncode == 1 and "cluster connectivity" in done.stdout, f"{name}: the tutorial: {done.stdout}")
+    # The page's program in C writes a run with the header that is there.
+    page = (options.source / "docs/reference/run.md").read_text()
+    (empty / "writes.cpp").write_text(page.split("```c\n")[1].split("```")[0])
+    built = run([options.cxx, "writes.cpp", "-o", "writes", "-I", root / "include"], **surroundings)
+    expect(built.returncode == 0, f"{name}: the page's writer of runs does not build: {built.stdout}")
+    done = run(["./writes"], **surroundings)
+    expect(done.returncode == 0, f"{name}: the page's writer of runs: {done.stdout}")
+    done = run([program, "check", "run"], **surroundings)
+    expect(done.returncode == 0, f"{name}: cutproof check run: {done.stdout}")
+    expect((root / "share/cutproof/python/cutproof_run.py").is_file(), f"{name}: the writer in Python is missing")
     # Scripts for clusters find the program that they were installed with.
     found = run([root / "share/cutproof/cluster/fuzz_shard.sh", "--program"], **surroundings)
     expect(found.returncode == 0 and os.path.realpath(found.stdout.strip()) == os.path.realpath(program),
