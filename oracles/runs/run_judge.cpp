@@ -200,7 +200,25 @@ class RunJudge::Implementation {
     made.perhaps_cut = tissue_->perhaps_cut();
     for (int32_t k = 0; k < made.units; ++k) made.beside += tissue_->is_beside(k);
     made.coupled = coupled_count_;
+    made.last_cut = last_cut_;
     return made;
+  }
+  std::vector<int32_t> piece_of_particles() const {
+    if (!tissue_ || !holds(kForm) || !holds(kFinite)) return {};
+    const SweptTissue::Pieces apart = tissue_->apart();
+    std::vector<int32_t> piece(at(n_), -1), lowest(at(apart.count), std::numeric_limits<int32_t>::max());
+    const auto each_particle = [&](const auto& visit) {
+      for (int32_t unit = 0; unit < units_; ++unit) {
+        if (apart.label[at(unit)] < 0) continue;
+        const auto of = at(apart.label[at(unit)]);
+        if (!by_cells()) visit(unit, lowest[of]);
+        for (int k = 0; k < unit_corners_; ++k)
+          visit(coupling_.cells[at(unit) * at(unit_corners_) + at(k)], lowest[of]);
+      }
+    };
+    each_particle([](int32_t particle, int32_t& of) { of = std::min(of, particle); });
+    each_particle([&](int32_t particle, int32_t of) { piece[at(particle)] = of; });
+    return piece;
   }
 
  private:
@@ -328,14 +346,24 @@ class RunJudge::Implementation {
   // Each particle goes where its velocity takes it: nothing may jump.
   void teleport(const RunFrame& frame) {
     if (frame.velocities.empty() || velocity_was_.empty() || !frame.time || !time_was_) return;
+    // Contacts push to all sides, and of what they do in a frame only the sum is known.
+    if (frame.contact_impulse && norm(*frame.contact_impulse) > 0) {
+      found_[kTeleport].why = "contacts push in every frame";
+      return;
+    }
     const double dt = *frame.time - *time_was_;
-    double change = 0, farthest = 0;
+    double change = 0, fastest = 0, farthest = 0;
     for (std::size_t i = 0; i < was_.size(); ++i) {
       if (exists_[i] == 0 || existed_[i] == 0) continue;
       change = std::max(change, norm(frame.velocities[i] - velocity_was_[i]));
+      fastest = std::max({fastest, norm(frame.velocities[i]), norm(velocity_was_[i])});
       farthest = std::max({farthest, norm(was_[i]), norm(frame.positions[i])});
     }
-    const double bound = kBetween * dt * change + 4 * header_.u * static_cast<double>(header_.steps) * farthest +
+    // Velocities may be damped behind the way that they have made, by exp(c dt) - 1 or 1 / (1 - c dt) - 1 of
+    // themselves.
+    const double decay = header_.damping * dt;
+    const double bound = kBetween * dt * change + dt * fastest * (decay + 2 * decay * decay) +
+                         4 * header_.u * static_cast<double>(header_.steps) * farthest +
                          (header_.promised(RunPromise::free) ? 0 : sweep_reach(frame)) + header_.cut_resolution;
     for (std::size_t i = 0; i < was_.size(); ++i) {
       if (exists_[i] == 0 || existed_[i] == 0 || (!frame.held.empty() && frame.held[i] != 0)) continue;
@@ -527,11 +555,14 @@ class RunJudge::Implementation {
         exists &= exists_[at(coupling_.cells[at(unit) * at(unit_corners_) + at(k)])] != 0;
       if (!exists) tissue_->remove(unit);
     }
+    if (is_new_gone_) last_cut_ = frame_;
     if (!frame.blade.empty() && !was_places_.empty()) {
       std::vector<Vec3> is = places(frame.positions);
       double farthest = 0;
       for (const Vec3 x : is) farthest = std::max(farthest, norm(x));
+      const int64_t cut_before = tissue_->surely_cut();
       tissue_->sweep(frame.blade, was_places_, is, header_.cut_resolution + 8 * header_.u * farthest);
+      if (tissue_->surely_cut() > cut_before) last_cut_ = frame_;
       was_places_ = std::move(is);
       return;
     }
@@ -650,7 +681,7 @@ class RunJudge::Implementation {
   std::vector<std::string> notes_;
   RunCoupling coupling_;
   bool is_coupled_ = false, is_new_coupling_ = false, is_new_gone_ = false, is_new_mass_ = false, has_blade_ = false;
-  int64_t frame_ = 0, frames_ = 0, n_ = 0, coupled_count_ = 0;
+  int64_t frame_ = 0, frames_ = 0, n_ = 0, coupled_count_ = 0, last_cut_ = -1;
   std::vector<uint8_t> exists_, existed_, ever_;  // [n]
   std::vector<int32_t> parent_;                   // [n] of each when it was new
   std::vector<Vec3> was_, velocity_was_, spin_was_, was_places_;
@@ -671,6 +702,7 @@ void RunJudge::finish() { self_->finish(); }
 std::vector<Verdict> RunJudge::verdicts() const { return self_->verdicts(); }
 std::vector<RunJudge::NotAsked> RunJudge::not_asked() const { return self_->not_asked(); }
 std::vector<std::string> RunJudge::notes() const { return self_->notes(); }
+std::vector<int32_t> RunJudge::piece_of_particles() const { return self_->piece_of_particles(); }
 RunPieces RunJudge::pieces() const { return self_->pieces(); }
 
 }  // namespace cutproof::oracles

@@ -16,6 +16,7 @@ struct RunPieces {
   std::vector<int64_t> sizes;                           // of the sure ones, descending
   int64_t surely_cut = 0, perhaps_cut = 0, beside = 0;  // edges of tissue; units that may be on either side
   int64_t coupled = 0;                                  // components of the coupling
+  int64_t last_cut = -1;                                // the last frame that surely parted tissue; -1: none
 };
 
 class RunJudge {
@@ -28,6 +29,10 @@ class RunJudge {
   void weigh(std::vector<double> mass);  // [n] [kg]
   void see(const RunFrame& frame);
   void finish();
+
+  // Of each particle the piece that it surely is in by now, told by the lowest particle in it; -1 of what is gone or no
+  // tissue. Empty where the run has no tissue.
+  std::vector<int32_t> piece_of_particles() const;
 
   // After finish(): one of each property that was asked, its first failure or what came nearest to its bound; and why
   // the others were not.

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -97,9 +98,11 @@ struct Bar {
     }
     judge.finish();
     pieces = judge.pieces();
+    piece_of = judge.piece_of_particles();
     return judge.verdicts();
   }
   mutable oracles::RunPieces pieces;
+  mutable std::vector<int32_t> piece_of;
 };
 
 std::string failing(const Bar& bar) {
@@ -120,6 +123,8 @@ TEST(RunJudge, HoldsOfABarThatIsPartedByItsBlade) {
   EXPECT_EQ(bar.pieces.sizes, (std::vector<int64_t>{12, 12}));
   EXPECT_EQ(bar.pieces.surely_cut, 4);
   EXPECT_EQ(bar.pieces.coupled, 2);
+  EXPECT_EQ(bar.pieces.last_cut, 5);
+  for (int k = 0; k < 24; ++k) EXPECT_EQ(bar.piece_of.at(at(k)), k % 6 >= 3 ? 3 : 0);
 }
 
 // Two tetrahedra share a face, whatever the order of their corners.
@@ -212,6 +217,45 @@ TEST(RunJudge, AllowsWhatSchemesOfDampingDiffer) {
       EXPECT_EQ(verdict.holds, is_right) << verdict.property << factor;
     }
   }
+}
+
+// A particle that something drags along: each velocity is damped once it has made its way.
+std::vector<Verdict> dragged(double damping, std::optional<Vec3> impulse) {
+  const double dt = 0.01, c = 2;
+  RunHeader header;
+  header.damping = damping * c;
+  RunJudge judge(header);
+  for (int f = 0; f < 5; ++f) {
+    const Vec3 x = {3 * f * dt, 0, 0}, v = {3 * std::exp(-c * dt), 0, 0};
+    RunFrame frame;
+    frame.index = f;
+    frame.time = f * dt;
+    frame.positions = {&x, 1};
+    frame.velocities = {&v, 1};
+    frame.contact_impulse = impulse;
+    judge.see(frame);
+  }
+  judge.finish();
+  return judge.verdicts();
+}
+bool has_teleport(const std::vector<Verdict>& verdicts) {
+  return std::any_of(verdicts.begin(), verdicts.end(), [](const Verdict& v) { return v.property == "no teleport"; });
+}
+bool holds(const std::vector<Verdict>& verdicts) {
+  return std::all_of(verdicts.begin(), verdicts.end(), [](const Verdict& v) { return v.holds; });
+}
+
+TEST(RunJudge, AllowsVelocitiesThatAreDampedBehindTheirWay) {
+  for (const double damping : {1.0, 0.5, 0.0}) {
+    const std::vector<Verdict> verdicts = dragged(damping, {});
+    EXPECT_TRUE(has_teleport(verdicts));
+    EXPECT_EQ(holds(verdicts), damping == 1) << damping;
+  }
+}
+
+TEST(RunJudge, AsksForNoTeleportWhereContactsPush) {
+  EXPECT_FALSE(has_teleport(dragged(0, Vec3{0, 0, 1e-9})));
+  EXPECT_TRUE(has_teleport(dragged(0, Vec3{})));
 }
 
 struct Fault {
