@@ -1,6 +1,7 @@
 #include "cli/findings.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <utility>
 
@@ -21,9 +22,24 @@ std::string case_name(const std::string& property, std::string_view stage) {
   return fmt::format("{} after {}", property, stage);
 }
 
+std::string case_name(const Verdict& verdict, const Judging& judging) {
+  return judging.of == Judging::Of::stages ? case_name(verdict.property, name_of(verdict.stage)) : verdict.property;
+}
+
+// In a line, as all that is known of it where a person reads nothing else.
+std::string in_full(const Verdict& verdict, const Judging& judging) {
+  if (judging.of == Judging::Of::stages) return io::verdict_text(verdict);
+  std::string text = fmt::format("'{}' fails", verdict.property);
+  if (judging.of == Judging::Of::frames) text += fmt::format(" in frame {}", verdict.frame);
+  if (!verdict.witness.particles.empty())
+    text += fmt::format(" at {} {}", verdict.witness.particles.size() == 1 ? "particle" : "particles",
+                        fmt::join(verdict.witness.particles, ", "));
+  return text + ": " + io::measured_text(verdict);
+}
+
 // Its witness says what was found; a property of few words has none.
-std::string what_was_found(const Verdict& verdict) {
-  return verdict.witness.text.empty() ? io::verdict_text(verdict) : verdict.witness.text;
+std::string what_was_found(const Verdict& verdict, const Judging& judging) {
+  return verdict.witness.text.empty() ? in_full(verdict, judging) : verdict.witness.text;
 }
 
 // Of the case that its command shows: the simplified one, where there is one.
@@ -65,7 +81,7 @@ std::vector<JunitCase> cases_of(const std::vector<Verdict>& verdicts, const Judg
                                 const std::function<bool(const Verdict&)>& is_expected) {
   std::vector<CaseRow> rows;
   for (const Verdict& verdict : verdicts) {
-    const std::string name = case_name(verdict.property, name_of(verdict.stage));
+    const std::string name = case_name(verdict, judging);
     auto row = rows.begin();
     while (row != rows.end() && row->name != name) ++row;
     if (row == rows.end()) row = rows.insert(rows.end(), {name});
@@ -85,9 +101,11 @@ std::vector<JunitCase> cases_of(const std::vector<Verdict>& verdicts, const Judg
     JunitCase& one = cases.emplace_back(JunitCase{row.name, judging.class_name});
     if (row.failing != nullptr) {
       one.outcome = JunitOutcome::failed;
-      one.message = what_was_found(*row.failing);
-      one.text = fmt::format("{}\n{} of {} verdicts fail.\nsee it again: {}\n", io::verdict_text(*row.failing),
-                             row.failed, row.verdicts, judging.again);
+      one.message = what_was_found(*row.failing, judging);
+      one.text = in_full(*row.failing, judging) + "\n";
+      if (judging.of == Judging::Of::stages)
+        one.text += fmt::format("{} of {} verdicts fail.\n", row.failed, row.verdicts);
+      one.text += "see it again: " + judging.again + "\n";
     } else if (row.expected != nullptr) {
       one.text = fmt::format("It fails, as the scene expects: {}\n", io::verdict_text(*row.expected));
     } else if (row.looked == 0) {
@@ -174,7 +192,7 @@ std::vector<Failure> failures_of(const std::vector<Verdict>& verdicts, const Jud
   std::vector<Failure> failures;
   for (const Verdict& verdict : verdicts) {
     if (verdict.holds || (is_expected && is_expected(verdict))) continue;
-    failures.push_back({verdict.property, what_was_found(verdict), judging.again});
+    failures.push_back({verdict.property, what_was_found(verdict, judging), judging.again});
   }
   return failures;
 }

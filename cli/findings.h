@@ -1,5 +1,6 @@
 // What verdicts and campaigns came to, for continuous integration: as test cases (JUnit) and as annotations.
 #pragma once
+#include <cstdint>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -17,11 +18,13 @@ struct Judging {
   std::string suite;       // such as "cutproof run"
   std::string class_name;  // of its cases: the suite, and what was judged
   std::string again;       // a command line
+  // What verdicts are of: frames that have stages, frames of somebody else's run, or one state.
+  enum class Of : uint8_t { stages, frames, state } of = Of::stages;
 };
 
-// A case for each property and stage, in the order in which they first appear: failed with its first failing verdict,
-// skipped where no verdict of it looked at anything.
-// `is_expected`: a failure that the scene asks for, which passes.
+// A case for each property and stage, or each property where there are no stages, in the order in which they first
+// appear: failed with its first failing verdict, skipped where no verdict of it looked at anything. `is_expected`: a
+// failure that the scene asks for, which passes.
 std::vector<io::JunitCase> cases_of(const std::vector<Verdict>& verdicts, const Judging& judging,
                                     const std::function<bool(const Verdict&)>& is_expected = {});
 // The same of all that was judged of a run. Skipped are what was not promised, with how often it would not hold, and

@@ -44,12 +44,15 @@ std::string in_unit(const std::string& figure, const std::string& unit) {
 }
 
 std::string verdict_text(const Verdict& verdict) {
-  const std::string begin = fmt::format("'{}' fails after {} in frame {} on backend '{}': ", verdict.property,
-                                        name_of(verdict.stage), verdict.frame, verdict.backend);
-  if (!was_judged(verdict)) return begin + verdict.witness.text;
-  return fmt::format(
-      "{}measured {}, bound {} ({}). {}", begin, in_unit(fmt::format("{:g}", verdict.measured), verdict.unit),
-      in_unit(fmt::format("{:g}", verdict.bound), verdict.unit), verdict.bound_source, verdict.witness.text);
+  return fmt::format("'{}' fails after {} in frame {} on backend '{}': {}", verdict.property, name_of(verdict.stage),
+                     verdict.frame, verdict.backend, measured_text(verdict));
+}
+
+std::string measured_text(const Verdict& verdict) {
+  if (!was_judged(verdict)) return verdict.witness.text;
+  return fmt::format("measured {}, bound {} ({}). {}", in_unit(fmt::format("{:g}", verdict.measured), verdict.unit),
+                     in_unit(fmt::format("{:g}", verdict.bound), verdict.unit), verdict.bound_source,
+                     verdict.witness.text);
 }
 
 }  // namespace cutproof::io

@@ -16,5 +16,7 @@ nlohmann::json verdicts_json(const std::vector<Verdict>& verdicts);
 std::string in_unit(const std::string& figure, const std::string& unit);
 // One that fails, in one line for a person (guide.md, Reading a verdict).
 std::string verdict_text(const Verdict& verdict);
+// Of it what was measured, the bound, and the witness.
+std::string measured_text(const Verdict& verdict);
 
 }  // namespace cutproof::io
