@@ -15,13 +15,14 @@ import os
 import numpy
 
 # Shapes by name: letters are any size, n is the number of particles.
-_ONCE = dict(rest="n3", mass="n", gravity="3", spacing="", steps="", damping="", edges="e2", cells="c4 c8", nodes="n3",
-             cut_resolution="", unit_roundoff="")
+_ONCE = dict(rest="n3", permutation="n", mass="n", gravity="3", spacing="", steps="", damping="", edges="e2", cells="c4 c8",
+             nodes="n3", cut_resolution="", unit_roundoff="")
 _BY_FRAME = dict(positions="n3", time="", velocities="n3", alive="n", held="n", removed="n", spin="n3",
                  contact_impulse="3", energy="", blade="q43 q33")
 _BY_SEGMENT = dict(parent="n", piece="n", mass="n", cells="c4 c8", vertices="v3", triangles="t3", groups_offsets="g",
                    groups_members="m", groups_weights="m")
-_WHOLE = {"edges", "cells", "nodes", "parent", "piece", "triangles", "groups_offsets", "groups_members", "steps"}
+_WHOLE = {"edges", "cells", "nodes", "parent", "piece", "permutation", "triangles", "groups_offsets", "groups_members",
+          "steps"}
 _FLAGS = {"alive", "held", "removed"}
 
 

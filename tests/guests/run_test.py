@@ -185,6 +185,11 @@ class Runs(JudgedRuns):
         self.assertEqual(failures(both, wrong, map="checkpoint"), ["related positions"])
         self.assertEqual(failures(both, dict(later, positions=x[2:5], time=time[2:5]), map="checkpoint"),
                          ["related frames"])
+        was, path = [4, 2, 0, 1, 3], self.folder / "permuted.h5"
+        with cutproof_run.Writer(path, permutation=was) as run:
+            for frame, at in enumerate(time):
+                run.frame(x[frame, was], time=at, groups=[[2, 3], [0, 1, 4]])
+        self.assertEqual(cutproof.relate(both, path, map="permute", bits=True).document["frames"], 6)
         for runs, map, words in (((both, later), "shift", "no map"), ((both, one), "refine", "3 or more"),
                                  ((both, dict(later, time=None)), "checkpoint", "Write time"),
                                  ((both, both), "permute", "which particle is which"),

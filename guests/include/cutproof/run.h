@@ -60,6 +60,7 @@ static const cutproof_run_array cutproof_run_arrays[] = {
     {"damping", 'o', 'r', '1', 1, 0},         /* c [1/s]: velocities decay as exp(-c t) */
     {"edges", 'o', 'w', '*', 2, 0},           /* pairs of particles that are tissue */
     {"nodes", 'o', 'w', 'n', 3, 0},           /* rest = spacing * nodes */
+    {"permutation", 'o', 'w', 'n', 1, 0},     /* which particle of a related run each one is */
     {"cut_resolution", 'o', 'r', '1', 1, 0},  /* [m] how far a cut may lie beside the blade's sweep */
     {"unit_roundoff", 'o', 'r', '1', 1, 0},   /* of your arithmetic, if not that of the type of positions */
     {"time", 'f', 'r', '1', 1, 0},            /* [s] at the end of the frame */
