@@ -40,6 +40,7 @@ for kind, block in re.findall(r"^```(python|sh|text)\n(.*?)^```", page, re.S | r
             name = command.split()[-1]
             if command.startswith("python3"):
                 command = f"{sys.executable} -B {name}"
+                script = name
                 if not (work / name).exists():
                     (work / name).write_text(code)
             before = (work / name).read_text() if command.startswith("sed ") else ""
@@ -50,7 +51,7 @@ for kind, block in re.findall(r"^```(python|sh|text)\n(.*?)^```", page, re.S | r
             if command.startswith("sed "):
                 assert (work / name).read_text() != before, f"{command} changes nothing"
                 wanted, red = 1, red + 1
-        print(f"{name}: {'red' if wanted else 'green'} after {time.monotonic() - begin:.1f} s")
+        print(f"{script}: {'red' if wanted else 'green'} after {time.monotonic() - begin:.1f} s")
     else:
         for line in block.strip().splitlines():
             assert words(line) in words(output), f"'{line}' is not printed:\n{output}"
