@@ -12,7 +12,8 @@ namespace cutproof::oracles {
 
 // How the tissue fell apart, by the blade's sweep alone.
 struct RunPieces {
-  int64_t units = 0, pieces = 0, at_most = 0;           // pieces that surely are, and that may be
+  int64_t units = 0, at_first = 0;                      // pieces before anything was cut
+  int64_t pieces = 0, at_most = 0;                      // that surely are, and that may be
   std::vector<int64_t> sizes;                           // of the sure ones, descending
   int64_t surely_cut = 0, perhaps_cut = 0, beside = 0;  // edges of tissue; units that may be on either side
   int64_t coupled = 0;                                  // components of the coupling

@@ -258,6 +258,40 @@ TEST(RunJudge, AsksForNoTeleportWhereContactsPush) {
   EXPECT_TRUE(has_teleport(dragged(0, Vec3{})));
 }
 
+// Two particles that vibrate against each other with this phase in a frame, from rest; one is put `jump` aside in the
+// middle of the run.
+bool is_without_teleport(double phase, double jump) {
+  constexpr double kDt = 0.01, kAmplitude = 1e-3;
+  RunJudge judge({});
+  double aside = 0;
+  for (int f = 0; f < 200; ++f) {
+    const double t = phase * f, v = kAmplitude * phase / kDt * std::cos(t);
+    aside += f == 100 ? jump : 0;
+    const std::vector<Vec3> x = {{-1 - kAmplitude * std::sin(t), aside, 0}, {1 + kAmplitude * std::sin(t), 0, 0}};
+    const std::vector<Vec3> velocities = {{-v, 0, 0}, {v, 0, 0}};
+    RunFrame frame;
+    frame.index = f;
+    frame.time = kDt * f;
+    frame.positions = x;
+    frame.velocities = velocities;
+    judge.see(frame);
+  }
+  judge.finish();
+  const std::vector<Verdict> verdicts = judge.verdicts();
+  const auto teleport =
+      std::find_if(verdicts.begin(), verdicts.end(), [](const Verdict& v) { return v.property == "no teleport"; });
+  return teleport != verdicts.end() && teleport->checked == 398 && teleport->holds;
+}
+
+TEST(RunJudge, TellsAVibrationThatFramesDoNotResolveFromATeleport) {
+  for (const double phase : {0.01, 0.3, 1.0, 2.0, 2.7, 3.1416, 4.0, 6.2832, 6.3, 9.0}) {
+    EXPECT_TRUE(is_without_teleport(phase, 0)) << phase;
+    const double fastest_way = 1e-3 * phase;  // peak speed times the frame
+    EXPECT_FALSE(is_without_teleport(phase, 2.01 * fastest_way)) << phase;
+  }
+  EXPECT_TRUE(is_without_teleport(0.01, 1.99 * 1e-5));
+}
+
 struct Fault {
   const char *name, *property;
   std::function<void(Bar&)> plant;
@@ -293,6 +327,11 @@ INSTANTIATE_TEST_SUITE_P(
                                 made.offsets.push_back(std::ssize(made.members));
                               }
                               torn = made;
+                            }},
+                      Fault{"nothing_is_coupled", "pieces coupled within",
+                            [](Bar& b) {
+                              b.coupling[kLate] = {};
+                              b.coupling[kLate].offsets = {0};
                             }},
                       Fault{"revived", "what is gone stays gone",
                             [](Bar& b) {
