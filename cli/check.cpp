@@ -100,7 +100,9 @@ int check(const CheckOptions& options) {
   }
   io::ArrayFile contents = io::read_array_file(options.recording);
   if (!io::RunSegments::is_segment(contents)) return check_state(contents, options.recording, reports);
-  io::RunSegments segments(options.recording, std::move(contents));
+  std::vector<io::ArrayFile> only(1);
+  only.front() = std::move(contents);
+  io::RunSegments segments(options.recording, std::move(only));
   return check_run(segments, options.recording, reports);
 }
 

@@ -1,11 +1,13 @@
 #include "harness/promises.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 
 #include "model/error.h"
+#include "oracles/runs/run.h"
 
 namespace cutproof::harness {
 
@@ -95,13 +97,14 @@ uint32_t parse_promises(std::string_view text, const std::string& file, const st
     const std::size_t end = std::min(text.find(' ', begin), text.size());
     const std::string_view word = text.substr(begin, end - begin);
     begin = end + 1;
-    if (word.empty()) continue;
+    constexpr const auto& of_runs = oracles::kRunPromises;
+    if (word.empty() || std::find(of_runs.begin(), of_runs.end(), word) != of_runs.end()) continue;
     const auto found = std::find_if(kWords.begin(), kWords.end(), [&](const PromiseWord& w) { return w.name == word; });
     if (found == kWords.end()) {
       std::string known;
-      for (const PromiseWord& each : kWords) known += (known.empty() ? "" : ", ") + std::string(each.name);
+      for (const PromiseWord& each : kWords) known += std::string(each.name) + ", ";
       throw InputError(file, field, fmt::format("there is no promise '{}'", word),
-                       fmt::format("give words of these, separated by spaces: {}", known));
+                       fmt::format("give words of these, separated by spaces: {}{}", known, fmt::join(of_runs, ", ")));
     }
     bits |= 1u << static_cast<unsigned>(found - kWords.begin());
   }

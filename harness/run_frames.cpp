@@ -1,6 +1,7 @@
 #include "harness/run_frames.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -16,17 +17,6 @@ namespace {
 
 constexpr int64_t kMost = std::numeric_limits<int32_t>::max();
 
-using oracles::RunPromise;
-
-struct RunWord {
-  std::string_view name;
-  RunPromise promise;
-};
-constexpr RunWord kRunWords[] = {{"free", RunPromise::free},
-                                 {"angular_momentum", RunPromise::angular_momentum},
-                                 {"energy", RunPromise::energy},
-                                 {"deterministic", RunPromise::deterministic}};
-
 uint32_t promises_of(const NamedArrays& in, const std::string& text) {
   uint32_t bits = 0;
   for (std::size_t begin = 0; begin < text.size();) {
@@ -34,14 +24,12 @@ uint32_t promises_of(const NamedArrays& in, const std::string& text) {
     const std::string_view word = std::string_view(text).substr(begin, end - begin);
     begin = end + 1;
     if (word.empty()) continue;
-    const auto found =
-        std::find_if(std::begin(kRunWords), std::end(kRunWords), [&](const RunWord& w) { return w.name == word; });
-    if (found == std::end(kRunWords)) {
-      std::string known;
-      for (const RunWord& each : kRunWords) known += (known.empty() ? "" : ", ") + std::string(each.name);
-      in.refuse("promises", fmt::format("A run cannot promise '{}'.", word), "Use " + known + ".");
+    const auto found = std::find(oracles::kRunPromises.begin(), oracles::kRunPromises.end(), word);
+    if (found == oracles::kRunPromises.end()) {
+      in.refuse("promises", fmt::format("A run cannot promise '{}'.", word),
+                fmt::format("Use {}.", fmt::join(oracles::kRunPromises, ", ")));
     }
-    bits |= 1u << static_cast<int>(found->promise);
+    bits |= 1u << (found - oracles::kRunPromises.begin());
   }
   return bits;
 }

@@ -71,8 +71,8 @@ RunSegments::RunSegments(std::string path) : path_(std::move(path)), source_(pat
 }
 
 std::optional<ArrayFile> RunSegments::next() {
-  if (only_) return std::exchange(only_, std::nullopt);
-  if (next_ == names_.size()) return std::nullopt;
+  if (next_ < in_memory_.size()) return std::move(in_memory_[next_++]);
+  if (next_ >= names_.size()) return std::nullopt;
   const std::string& name = names_[next_];
   const bool is_first = next_++ == 0;
   source_ = is_folder_ ? name : path_ + "/" + name;

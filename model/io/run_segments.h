@@ -19,8 +19,9 @@ class RunSegments {
 
   // Requires has_segments(path). Throws InputError if there is no segment.
   explicit RunSegments(std::string path);
-  // The only one, which has been read.
-  RunSegments(std::string path, ArrayFile contents) : source_(std::move(path)), only_(std::move(contents)) {}
+  // Those that are in memory; `source`: what errors name.
+  RunSegments(std::string source, std::vector<ArrayFile> segments)
+      : source_(std::move(source)), in_memory_(std::move(segments)) {}
 
   // The next one, or nothing after the last; the first with what is given once per run. Throws what read_array_file
   // throws.
@@ -32,7 +33,7 @@ class RunSegments {
   std::string path_, source_;
   bool is_folder_ = false;
   std::vector<std::string> names_;
-  std::optional<ArrayFile> only_;
+  std::vector<ArrayFile> in_memory_;  // without names
   std::size_t next_ = 0;
 };
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "model/vec.h"
@@ -18,6 +19,8 @@ enum class RunPromise : uint8_t {
   energy,            // `energy` never grows while nothing pushes
   deterministic,     // a second run has the same bits, which one run does not show
 };
+// Their words, in that order.
+inline constexpr std::array<std::string_view, 4> kRunPromises = {"free", "angular_momentum", "energy", "deterministic"};
 
 // Lists are empty where they are not given. Particles are numbered from 0; n is their number in the first frame.
 struct RunHeader {
