@@ -58,7 +58,7 @@ constexpr int64_t kUsualDissections = 500;
 
 // Operations by what one case costs.
 int64_t usual_cases(const OperationDescription& operation) {
-  return operation.number == wire::rotations ? 100'000 : 2'000;
+  return operation.number == wire::rotations ? 100'000 : operation.is_simulator() ? 200 : 2'000;
 }
 
 std::vector<int64_t> sizes_of(const JudgeOptions& options, const OperationDescription& operation) {
@@ -151,7 +151,9 @@ void print_properties(const KernelCampaign& campaign) {
   if (campaign.refused > 0) {
     say("  {}: {} questions, of which nothing is known\n", undecided("refused"), campaign.refused);
   }
-  if (campaign.questions == campaign.refused) insist("{}: nothing was judged\n", failing("FAILS"));
+  if (const std::string why = campaign.untested(); !why.empty()) {
+    insist("{}: too little was judged: {}\n", failing("FAILS"), why);
+  }
 }
 
 constexpr const char* kClass = "cutproof.judge";
@@ -163,8 +165,26 @@ std::string replay_command(const JudgeOptions& options, const std::string& file,
                      quoted(file));
 }
 
+// What a simulator makes of it, for `cutproof check`.
+void keep_run(const std::string& file, Guest& guest, const OperationDescription& operation,
+              const KernelFailure& failure) {
+  if (guest.has_ended()) return;
+  const Answer answer = ask(guest, operation, failure.simplest, failure.at_end);
+  if (answer.kind != Answer::Kind::answered) return;
+  const std::filesystem::path folder = std::filesystem::path(file).replace_extension() += "_run";
+  const auto frames = operation.files(failure.simplest, answer.arrays, guest.plugin().precision);
+  if (frames.empty()) return;
+  make_folder("--save", folder.string());
+  const auto path = [&](std::size_t frame) { return folder / fmt::format("run_{:06}.npz", frame); };
+  for (std::size_t f = 0; f < frames.size(); ++f) io::write_array_file(path(f).string(), frames[f]);
+  // Frames of an older run do not go on behind these.
+  for (std::size_t f = frames.size(); std::filesystem::remove(path(f)); ++f) {
+  }
+  insist_copy("  its run:", "cutproof check " + quoted(folder.string()));
+}
+
 // Saves what was found and says how to see it again.
-std::string keep(const JudgeOptions& options, const Guest& guest, const KernelCampaign& campaign,
+std::string keep(const JudgeOptions& options, Guest& guest, const KernelCampaign& campaign,
                  const KernelFailure& failure) {
   SavedQuestion saved;
   saved.operation = campaign.operation->name;
@@ -188,6 +208,7 @@ std::string keep(const JudgeOptions& options, const Guest& guest, const KernelCa
   insist("  simplified to {}: {}\n", campaign.operation->size_of(failure.simplest),
          shortened(failure.of_simplest.witness.text, kMostWitnessBytes));
   insist_copy("  saved; to see it again:", replay_command(options, file, saved.operation));
+  if (campaign.operation->files != nullptr) keep_run(file, guest, *campaign.operation, failure);
   return file;
 }
 
@@ -222,10 +243,10 @@ void add_cases(const json& result, const JudgeOptions& options, std::vector<io::
     each.outcome = io::JunitOutcome::skipped;
     each.message = "not promised, not judged";
   }
-  if (result.at("questions") == result.at("refused")) {
+  if (const std::string untested = result.at("untested"); !untested.empty()) {
     io::JunitCase& each = add("something was judged");
     each.outcome = io::JunitOutcome::failed;
-    each.message = fmt::format("all {} questions were refused", result.at("refused").get<int64_t>());
+    each.message = untested;
     failures.push_back({operation, each.message, options.again});
   }
 }
@@ -427,10 +448,10 @@ void add_judge(CLI::App& program, Work& work) {
       ->type_name("FILE.so");
   command
       ->add_option("operations", options->operations,
-                   "which of its operations: rotations, components, surface, clusters, stages (default: all)")
+                   "which of its operations: rotations, components, surface, clusters, dissect, stages (default: all)")
       ->type_name("OPS");
-  add_count(*command, "--cases", options->cases, "matrices or bodies for each operation (default: 100000 or 2000)",
-            whole_number(1));
+  add_count(*command, "--cases", options->cases,
+            "matrices, bodies or scenes for each operation (default: 100000, 2000 or 200)", whole_number(1));
   command
       ->add_option("--sizes", options->sizes,
                    "of large questions, as matrices or particles; 0: ask none (default: beside 65536 and more)")

@@ -1,7 +1,7 @@
 # cutproof_add_test(NAME test PLUGIN target [OPS op...] [CASES n] [SEED n] [PARAMETERS text] [TIME_LIMIT s])
 #
 # Adds a CTest test that judges a plugin (cutproof/plugin.h): passed where everything holds, skipped where the plugin
-# cannot run (no CUDA device), failed otherwise. OPS: rotations, components, surface, clusters, stages; all that the
+# cannot run (no CUDA device), failed otherwise. OPS: rotations, components, surface, clusters, dissect, stages; all that the
 # plugin has if there are none. Counterexamples are left in the current binary directory, and a report for continuous
 # integration beside them (NAME.junit.xml).
 function(cutproof_add_test)

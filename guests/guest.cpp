@@ -241,6 +241,7 @@ void Guest::greet(double time_limit) {
   plugin_.name = text(hello->name);
   plugin_.version = text(hello->version);
   plugin_.promises = hello->has_promises != 0 ? std::optional(text(hello->promises)) : std::nullopt;
+  plugin_.limits = text(hello->limits);
   plugin_.on_device = hello->device != 0;
   plugin_.operations = hello->operations;
   plugin_.spans = hello->spans;

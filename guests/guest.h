@@ -30,6 +30,7 @@ struct GuestOptions {
 struct PluginInfo {
   std::string name, version;
   std::optional<std::string> promises;  // words separated by spaces
+  std::string limits;                   // of dissect, likewise
   bool on_device = false;
   Precision precision = Precision::binary32;
   uint32_t operations = 0, spans = 0;  // as in wire::Hello

@@ -1,12 +1,20 @@
 #include "guests/tissue_arrays.h"
 
+#include <algorithm>
+#include <iterator>
+#include <string_view>
+
 #include "model/at.h"
 
 namespace cutproof::guests {
 
 namespace {
 
-bool is_member(const Array& array) { return array.name == "spacing" || array.name == "nodes"; }
+// Members of a struct, not arrays.
+bool is_member(const Array& array) {
+  constexpr std::string_view kMembers[] = {"spacing", "nodes", "gravity", "frame_time", "blades"};
+  return std::find(std::begin(kMembers), std::end(kMembers), array.name) != std::end(kMembers);
+}
 
 }  // namespace
 

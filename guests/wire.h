@@ -10,7 +10,7 @@
 
 namespace cutproof::guests::wire {
 
-inline constexpr uint32_t kProtocol = 1;
+inline constexpr uint32_t kProtocol = 2;
 inline constexpr int64_t kPage = 4096;
 inline constexpr int64_t kArrayBytes = int64_t{16} << 30;
 inline constexpr int64_t kArenaBytes = int64_t{2} << 30;
@@ -24,8 +24,7 @@ inline constexpr unsigned char kCanary = 0xc5;
 inline constexpr int64_t kDeviceCanary = 4096;
 
 // By bit in Hello::operations; those of cutproof/plugin.h.
-enum Operation : uint32_t { rotations, components, surface, clusters, load, run };
-inline constexpr int kOperationCount = 6;
+enum Operation : uint32_t { rotations, components, surface, clusters, load, run, dissect };
 
 enum class Role : int32_t {
   given,   // the guest may only read it
@@ -92,6 +91,7 @@ struct Hello {
   uint32_t request_bytes, reply_bytes;  // sizeof, as the guest knows them
   char name[64], version[64];
   char promises[512];
+  char limits[512];  // of dissect
   char text[512];
 };
 

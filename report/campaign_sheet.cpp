@@ -185,10 +185,11 @@ Sheet judge_sheet(const Field& document) {
     const std::string operation = one["operation"].text();
     const int64_t questions = one["questions"].count(), refused = one["refused"].count(),
                   failed = one["failed"].count();
+    const std::string untested = questions <= refused ? "every question was refused" : one["untested"].text_or("");
     PropertyTable properties = property_table(one["properties"]);
     const std::size_t failures = one["failures"].length();
     const bool holds =
-        one["holds"].flag() && failed == 0 && failures == 0 && properties.failing == 0 && questions > refused;
+        one["holds"].flag() && failed == 0 && failures == 0 && properties.failing == 0 && untested.empty();
     const bool is_whole = one["complete"].flag();
     all_hold = all_hold && holds;
     failing += !holds;
@@ -201,7 +202,7 @@ Sheet judge_sheet(const Field& document) {
                                 io::grouped(refused), io::grouped(one["not_answered"].count()), io::grouped(failed),
                                 io::grouped(one["failed_cases"].count()), figure_text(one["seconds"].number())},
                                holds ? "" : "bad"});
-    if (questions <= refused) sheet.notes.push_back(operation + ": every question was refused, so nothing was judged.");
+    if (!untested.empty()) sheet.notes.push_back(operation + ": too little was judged: " + untested + ".");
     if (one["ended"].flag())
       sheet.notes.push_back(operation +
                             ": the plugin's process ended and could not be started again; nothing more was asked.");

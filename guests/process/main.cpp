@@ -283,6 +283,46 @@ cutproof_state state() {
   return s;
 }
 
+cutproof_scene scene(const cutproof_tissue& tissue) {
+  cutproof_scene s = {};
+  s.size = sizeof s;
+  s.tissue = &tissue;
+  s.velocity = call.shown("velocity");
+  s.held = call.shown("held");
+  s.tetrahedra = call.shown("tetrahedra");
+  s.hexahedra = call.shown("hexahedra");
+  s.blade = call.shown("blade");
+  s.blades = host_value("blades", 0, int32_t{0});
+  if (s.blade != nullptr && s.blades > 0) s.frames = static_cast<int32_t>(s.blade->rows / s.blades);
+  s.frame_time = host_value("frame_time", 0, 0.0);
+  for (int axis = 0; axis < 3; ++axis) s.gravity[axis] = host_value("gravity", axis, 0.0);
+  return s;
+}
+
+cutproof_run run() {
+  cutproof_run r = {};
+  r.size = sizeof r;
+  r.steps = call.shown("run/steps");
+  r.damping = call.shown("run/damping");
+  r.particles = call.shown("run/particles");
+  r.position = call.shown("run/position");
+  r.velocity = call.shown("run/velocity");
+  r.spin = call.shown("run/spin");
+  r.mass = call.shown("run/mass");
+  r.alive = call.shown("run/alive");
+  r.parent = call.shown("run/parent");
+  r.contact_impulse = call.shown("run/contact_impulse");
+  r.energy = call.shown("run/energy");
+  r.group_count = call.shown("run/group_count");
+  r.offsets = call.shown("run/offsets");
+  r.members = call.shown("run/members");
+  r.weights = call.shown("run/weights");
+  r.cell_count = call.shown("run/cell_count");
+  r.tetrahedra = call.shown("run/tetrahedra");
+  r.hexahedra = call.shown("run/hexahedra");
+  return r;
+}
+
 // A member of the plugin, which an older header does not have.
 #define OF_PLUGIN(member) (CUTPROOF_HAS(plugin, member) ? plugin->member : nullptr)
 
@@ -317,6 +357,11 @@ int ask(void* self) {
       return plugin->load(&host, self, &t, &s);
     case wire::run:
       return plugin->run(&host, self, call.request.first, call.request.last, &s);
+    case wire::dissect: {
+      const cutproof_scene asked = scene(t);
+      cutproof_run r = run();
+      return plugin->dissect(&host, self, &asked, &r);
+    }
     default:
       return -1;
   }
@@ -452,6 +497,8 @@ void greet(wire::Hello& hello, const char* library) {
   put(hello.version, plugin->version != nullptr ? plugin->version : "");
   hello.has_promises = plugin->promises != nullptr;
   put(hello.promises, plugin->promises != nullptr ? plugin->promises : "");
+  const char* const limits = OF_PLUGIN(limits);
+  put(hello.limits, limits != nullptr ? limits : "");
   hello.device = plugin->device;
   hello.real = plugin->real == 0 ? static_cast<int32_t>(CUTPROOF_F32) : plugin->real;
   const auto offers = [&](wire::Operation operation, bool there) {
@@ -463,6 +510,7 @@ void greet(wire::Hello& hello, const char* library) {
   offers(wire::clusters, OF_PLUGIN(clusters) != nullptr);
   offers(wire::load, OF_PLUGIN(load) != nullptr);
   offers(wire::run, OF_PLUGIN(run) != nullptr);
+  offers(wire::dissect, OF_PLUGIN(dissect) != nullptr);
   for (int first = 0; first < 6; ++first) {
     for (int last = first; last < 6; ++last) {
       if (OF_PLUGIN(can_run) != nullptr && plugin->can_run(first, last) == 0) continue;

@@ -1,4 +1,4 @@
-"""cutproof.py: have your own kernels judged, from Python. Copy this file into your project.
+"""cutproof.py: have your own kernels, or a whole simulator, judged from Python. Copy this file into your project.
 
 SPDX-License-Identifier: MIT
 
@@ -29,7 +29,8 @@ import unittest
 
 import numpy
 
-__all__ = ["judge", "replay", "kick", "relate", "mapped", "Failed", "Skipped", "Refused", "Error", "Result", "Tissue", "DeviceArray"]
+__all__ = ["judge", "replay", "kick", "relate", "mapped", "Failed", "Skipped", "Refused", "Error", "Result", "Tissue",
+           "Scene", "DeviceArray"]
 
 
 class Failed(AssertionError):
@@ -54,7 +55,7 @@ class Error(RuntimeError):
 
 # --- guests/wire.h ----------------------------------------------------------------------------------------------------
 
-_PROTOCOL = 1
+_PROTOCOL = 2
 _PAGE = 4096
 _ARRAY_BYTES = 16 << 30
 _ARENA_BYTES = 2 << 30
@@ -65,7 +66,8 @@ _CANARY = 0xC5
 _DEVICE_CANARY = 4096
 _MOST_ARRAYS = 96
 _MOST_GROWN = _ARENA_BYTES - 2 * _LEAST_GAP - 2 * _PAGE
-_OPERATIONS = ("rotations", "components", "surface", "clusters")  # by their numbers
+_OPERATIONS = {"rotations": 0, "components": 1, "surface": 2, "clusters": 3, "dissect": 6}
+_NAMES = {number: name for name, number in _OPERATIONS.items()}
 _GIVEN, _ANSWER, _GROWN, _SETUP = range(4)
 _ANSWERED, _REFUSED, _BROKE_A_RULE, _DEVICE_FAILED = range(4)
 _READY = 0
@@ -94,7 +96,7 @@ class _Hello(ctypes.Structure):
                 ("operations", ctypes.c_uint32), ("spans", ctypes.c_uint32), ("device", ctypes.c_int32),
                 ("real", ctypes.c_int32), ("has_promises", ctypes.c_int32), ("remembers_faults", ctypes.c_int32),
                 ("request_bytes", ctypes.c_uint32), ("reply_bytes", ctypes.c_uint32), ("name", ctypes.c_char * 64),
-                ("version", ctypes.c_char * 64), ("promises", ctypes.c_char * 512), ("text", ctypes.c_char * 512)]
+                ("version", ctypes.c_char * 64), ("promises", ctypes.c_char * 512), ("limits", ctypes.c_char * 512), ("text", ctypes.c_char * 512)]
 
 
 def _place_in_arena(arena, size, at_end):
@@ -121,6 +123,26 @@ class Tissue:
     spacing       float          of the grid, else the longest edge; m
     """
     __slots__ = ("edge_offsets", "edge_ends", "rest", "mass", "node", "nodes", "spacing")
+
+
+class Scene:
+    """What a whole simulator is asked: a body at rest, n particles, and what becomes of it. Arrays are read-only.
+
+    rest, velocities  real (n, 3)           at the start: m, m/s
+    mass              real (n)              kg
+    held              bool (n)              it stays where it is
+    nodes             int32 (n, 3)          of the grid
+    edges             int32 (e, 2)          tissue: pairs of particles that belong together
+    tetrahedra        int32 (c, 4)          of the grid, hexahedra int32 (k, 8) in VTK's order of corners
+    spacing           float                 of the grid; m
+    gravity           (x, y, z)             m/s^2
+    frames            int                   that are wanted, of which the first is the start
+    frame_time        float                 s
+    blade             real (frames, q, 4, 3)  the quads that q strokes sweep on the way to each frame, where they lie at
+                                            its end; NaN: none
+    """
+    __slots__ = ("rest", "velocities", "mass", "held", "nodes", "edges", "tetrahedra", "hexahedra", "spacing",
+                 "gravity", "frames", "frame_time", "blade")
 
 
 class _Broken(Exception):
@@ -188,6 +210,104 @@ def _clusters_of(value):
     members = [_as_array(cluster, f"cluster {k}", numpy.int32, (None,), None) for k, cluster in enumerate(value)]
     offsets = numpy.cumsum([0] + [len(cluster) for cluster in members])
     return offsets, numpy.concatenate(members) if members else []
+
+
+# Of a frame: shapes, in which n is the number of its particles. The others are cells and groups.
+_OF_FRAME = {"positions": ("position", "n3"), "velocities": ("velocity", "n3"), "spin": ("spin", "n3"),
+             "mass": ("mass", "n"), "alive": ("alive", "n"), "parent": ("parent", "n"),
+             "contact_impulse": ("contact_impulse", "3"), "energy": ("energy", ""), "steps": ("steps", ""),
+             "damping": ("damping", "")}
+_IGNORED = {"time", "blade", "removed"}  # what cutproof_run.Writer.frame takes too; `removed` says who is not alive
+_WHOLE = {"parent": numpy.int32, "alive": numpy.uint8, "steps": numpy.int64}
+
+
+def _run_of(frames, wanted, real, device):
+    """Outputs by name, from what a simulator yields: a dict for each frame, as cutproof_run.Writer.frame takes it."""
+    if len(frames) != wanted:
+        raise _Broken(f"it gave {len(frames)} frames, {wanted} are wanted")
+    made = {name: [] for name in _OF_FRAME}
+    counts, groups, cells = [], [], []
+    for f, frame in enumerate(frames):
+        if not isinstance(frame, dict) or "positions" not in frame:
+            raise _Broken(f"frame {f} is no dict that holds positions")
+        strange = set(frame) - set(_OF_FRAME) - _IGNORED - {"groups", "cells"}
+        if strange:
+            raise _Broken(f"frame {f} holds {min(strange)}, which is not known")
+        n = len(frame["positions"])
+        counts.append(n)
+        if "removed" in frame and "alive" not in frame:
+            frame = dict(frame, alive=~numpy.asarray(frame["removed"], bool))
+        for name, (_, shape) in _OF_FRAME.items():
+            if frame.get(name) is None:
+                continue
+            value = frame[name]
+            if name == "alive":
+                value = numpy.asarray(value, bool).view(numpy.uint8)
+            elif name == "steps" or name == "parent":
+                value = numpy.asarray(value)
+            elif device is None:  # whole numbers are places, too
+                value = numpy.asarray(value, dtype=None if numpy.asarray(value).dtype.kind == "f" else float)
+            made[name].append(_as_array(value, f"{name} of frame {f}", _WHOLE.get(name, real),
+                                        tuple(n if c == "n" else int(c) for c in shape), device))
+        groups.append(_groups_of(frame.get("groups"), f, real, device))
+        cells.append(None if frame.get("cells") is None else
+                     _as_array(frame["cells"], f"cells of frame {f}", numpy.int32, (None, None), device))
+    run = {}
+    for name, (output, shape) in _OF_FRAME.items():
+        given, least = len(made[name]), {"steps": 1, "damping": 1}.get(name, wanted)
+        if given not in (0, least, wanted):
+            raise _Broken(f"{name} is in {given} of {wanted} frames")
+        parts = made[name][:least]
+        parts = parts if shape.startswith("n") else [part[None] for part in parts]
+        empty = numpy.zeros((0, 3) if shape.endswith("3") else 0, _WHOLE.get(name, real))
+        run["run/" + output] = numpy.concatenate(parts) if parts else empty
+    run["run/particles"] = numpy.array(counts, numpy.int32)
+    return run | _packed_groups(groups, real) | _packed_cells(cells)
+
+
+def _groups_of(groups, f, real, device):
+    """Offsets, members and weights, from a tuple (offsets, members, weights or none), a list of lists, or an array with
+    a group in each row."""
+    if groups is None:
+        return None
+    name = f"groups of frame {f}"
+    if isinstance(groups, tuple) and len(groups) in (2, 3):
+        return [None if part is None else _as_array(part, f"{what} of {name}", kind, (None,), device)
+                for part, what, kind in zip((*groups, None), ("offsets", "members", "weights"),
+                                            (numpy.int64, numpy.int32, real))]
+    offsets = numpy.cumsum([0] + [len(group) for group in groups])
+    members = numpy.concatenate([numpy.asarray(group) for group in groups]) if len(groups) else numpy.zeros(0, int)
+    return [offsets, _as_array(members, name, numpy.int32, (None,), device), None]
+
+
+def _packed_groups(groups, real):
+    given = [group for group in groups if group is not None]
+    weighted = [group[2] for group in given if group[2] is not None]
+    if weighted and len(weighted) != len(given):
+        raise _Broken("groups have weights in some frames and none in others")
+    offsets, total = [0], 0
+    for ends, members, _ in given:
+        if len(ends) == 0 or ends[0] != 0 or ends[-1] != len(members):
+            raise _Broken(f"offsets of groups do not go from 0 to {len(members)}")
+        offsets += [total + int(end) for end in ends[1:]]
+        total += len(members)
+    counts = [-1 if group is None else len(group[0]) - 1 for group in groups]
+    return {"run/group_count": numpy.array(counts if given else [], numpy.int32),
+            "run/offsets": numpy.array(offsets if given else [], numpy.int64),
+            "run/members": numpy.concatenate([group[1] for group in given] or [numpy.zeros(0, numpy.int32)]),
+            "run/weights": numpy.concatenate(weighted or [numpy.zeros(0, real)])}
+
+
+def _packed_cells(cells):
+    given = [cell for cell in cells if cell is not None]
+    corners = {cell.shape[1] for cell in given}
+    if not corners <= {4} and not corners <= {8}:
+        raise _Broken(f"cells have {' and '.join(map(str, sorted(corners)))} corners, 4 or 8 are wanted")
+    counts = [-1 if cell is None else len(cell) for cell in cells]
+    packed = {"run/cell_count": numpy.array(counts if given else [], numpy.int32)}
+    for name, count in (("run/tetrahedra", 4), ("run/hexahedra", 8)):
+        packed[name] = numpy.concatenate(given) if corners == {count} else numpy.zeros((0, count), numpy.int32)
+    return packed
 
 
 # --- CUDA -------------------------------------------------------------------------------------------------------------
@@ -312,7 +432,7 @@ class DeviceArray:
 class _Guest:
     """This process as the program's guest: greets it, and answers its questions until it ends."""
 
-    def __init__(self, functions, precision, device, promises, name):
+    def __init__(self, functions, precision, device, promises, name, limits=None):
         for operation, function in functions.items():
             if not callable(function):
                 raise TypeError(f"{operation} is {type(function).__name__}, a function is wanted")
@@ -328,11 +448,12 @@ class _Guest:
         self.hello = _Hello(protocol=_PROTOCOL, greeting=_READY, device=self.device is not None,
                             real=4 if precision == "single" else 5, has_promises=promises is not None,
                             request_bytes=ctypes.sizeof(_Request), reply_bytes=ctypes.sizeof(_Reply),
-                            operations=sum(1 << _OPERATIONS.index(operation) for operation in functions))
+                            operations=sum(1 << _OPERATIONS[operation] for operation in functions))
         self.hello.name = _cut(name or ", ".join(_name_of(function) for function in functions.values()), 63)
-        if promises is not None and len(promises.encode()) > 511:
-            raise ValueError("promises is too long")
-        self.hello.promises = (promises or "").encode()
+        for what, words in (("promises", promises), ("limits", limits)):
+            if words is not None and len(words.encode()) > 511:
+                raise ValueError(f"{what} is too long")
+        self.hello.promises, self.hello.limits = (promises or "").encode(), (limits or "").encode()
         self.tracebacks = {}  # by the text of the fault
         self.lock = threading.Lock()
         self.thread = None  # in which a function is at work
@@ -424,7 +545,7 @@ class _Guest:
         for k, array in enumerate(arrays):
             reply.rows[k], reply.offset[k] = array.rows, array.offset
         try:
-            outputs = self._ask(_OPERATIONS[request.operation], arrays)
+            outputs = self._ask(_NAMES[request.operation], arrays)
             for k, array in enumerate(arrays):
                 if array.role in (_ANSWER, _GROWN):
                     reply.rows[k], reply.offset[k] = self._write(array, outputs[array.name.decode()], request.at_end)
@@ -455,7 +576,7 @@ class _Guest:
             if array.role not in (_GIVEN, _SETUP):
                 continue
             view = self._view(array)
-            if name == "alive":
+            if name in ("alive", "held"):
                 view = view.view(bool)  # so that it is a mask, not a list of indices
             if operation == "rotations":
                 view = view.reshape(-1, 3, 3)
@@ -466,6 +587,9 @@ class _Guest:
                 on_device.append(given[name])
         if operation == "rotations":
             count, arguments = len(given["a"]), (given["a"], given["previous"])
+        elif operation == "dissect":
+            asked = self._scene_of(given, arrays)
+            arguments = (asked,)
         else:
             tissue = Tissue()
             for name in ("edge_offsets", "edge_ends", "rest", "mass", "node"):
@@ -478,12 +602,16 @@ class _Guest:
         if self.device is not None:
             self.device.synchronize()  # copies are there before work on any stream begins
         try:
-            value = self._call(self.functions[operation], arguments)
+            function = self.functions[operation]
+            # Of a generator the frames are made here, where it can be interrupted.
+            value = self._call(function if operation != "dissect" else lambda scene: list(function(scene)), arguments)
         finally:
             if self.device is not None:
                 self.device.synchronize()
         for array in on_device:
             array.check()
+        if operation == "dissect":
+            return _run_of(value, asked.frames, self.real, self.device)
         if operation == "rotations":
             wanted = {"r": (value, self.real, (count, 3, 3))}
         elif operation == "components":
@@ -495,6 +623,26 @@ class _Guest:
             offsets, members = _clusters_of(value)
             wanted = {"offsets": (offsets, numpy.int64, (None,)), "members": (members, numpy.int32, (None,))}
         return {name: _as_array(value, name, kind, shape, self.device) for name, (value, kind, shape) in wanted.items()}
+
+    def _scene_of(self, given, arrays):
+        host = {array.name.decode(): self._view(array) for array in arrays}
+        scene = Scene()
+        for name, of in (("rest", "rest"), ("velocities", "velocity"), ("mass", "mass"), ("held", "held"),
+                         ("nodes", "node"), ("tetrahedra", "tetrahedra"), ("hexahedra", "hexahedra")):
+            setattr(scene, name, given[of])
+        first = numpy.repeat(numpy.arange(len(host["mass"]), dtype=numpy.int32), numpy.diff(host["edge_offsets"]))
+        edges = numpy.stack([first, host["edge_ends"]], 1)
+        edges = edges[edges[:, 0] < edges[:, 1]]
+        scene.spacing, scene.frame_time = float(host["spacing"][0]), float(host["frame_time"][0])
+        scene.gravity = host["gravity"].copy()
+        blade = host["blade"].reshape(-1, int(host["blades"][0]), 4, 3)
+        scene.frames = len(blade)
+        blade.flags.writeable = False
+        scene.edges, scene.blade = edges, blade
+        if self.device is not None:
+            scene.edges, scene.blade = (DeviceArray(self.device, array, name)
+                                        for array, name in ((edges, "edges"), (blade, "blade")))
+        return scene
 
     def _write(self, array, values, at_end):
         """Its rows and offset in memory."""
@@ -561,19 +709,19 @@ class Result:
         return f"<cutproof.Result: all hold{counts and f' ({counts})'}>"
 
 
-def judge(*, rotations=None, components=None, surface=None, clusters=None, cases=None, sizes=None, seconds=None, seed=1,
-          precision="single", device="host", promises=None, name=None, time_limit=60, simplify=20, save=".",
-          keep_going=False, verbose=False):
+def judge(*, rotations=None, components=None, surface=None, clusters=None, dissect=None, cases=None, sizes=None,
+          seconds=None, seed=1, precision="single", device="host", promises=None, limits=None, name=None, time_limit=60,
+          simplify=20, save=".", keep_going=False, verbose=False):
     """Asks the functions that are given, each in many cases. Returns a Result; raises Failed, Skipped or Error.
 
-    cases, seconds: how many matrices or bodies for each function, or for how long. sizes: of large questions, as matrices
+    cases, seconds: how many matrices, bodies or scenes for each function, or for how long. sizes: of large questions, as matrices
     or particles; (): none; None: beside 65536 and more. promises: words of what is vouched
-    for; None: what goes without saying. time_limit: seconds for each answer. simplify: seconds for making each failing
+    for; None: what goes without saying. limits: words of what `dissect` takes; None: all. time_limit: seconds for each answer. simplify: seconds for making each failing
     case smaller. save: folder for failing cases. keep_going: beyond ten questions that were not answered.
     """
     __tracebackhide__ = True  # pytest shows the caller, not us
-    functions = _given(rotations=rotations, components=components, surface=surface, clusters=clusters)
-    guest = _Guest(functions, precision, device, promises, name)
+    functions = _given(rotations=rotations, components=components, surface=surface, clusters=clusters, dissect=dissect)
+    guest = _Guest(functions, precision, device, promises, name, limits)
     words = list(functions) + [f"--seed={seed}", f"--time-limit={time_limit}", f"--simplify={simplify}",
                                f"--save={os.fspath(save)}"]
     words += [f"--cases={cases}"] if cases is not None else []
@@ -595,11 +743,11 @@ def judge(*, rotations=None, components=None, surface=None, clusters=None, cases
     return Result(output, document)
 
 
-def replay(file, *, rotations=None, components=None, surface=None, clusters=None, precision=None, device="host",
-           promises=None, name=None, time_limit=60, verbose=False):
+def replay(file, *, rotations=None, components=None, surface=None, clusters=None, dissect=None, precision=None,
+           device="host", promises=None, name=None, time_limit=60, verbose=False):
     """Asks one saved question again, in the precision in which it failed. Returns, and raises, as judge does."""
     __tracebackhide__ = True
-    functions = _given(rotations=rotations, components=components, surface=surface, clusters=clusters)
+    functions = _given(rotations=rotations, components=components, surface=surface, clusters=clusters, dissect=dissect)
     if precision is None:
         try:
             with open(file, encoding="utf-8") as opened:
@@ -721,8 +869,8 @@ def _describe(guest, document, seed, precision):
             if trace is None and failure["text"].startswith("it did not answer"):
                 trace = guest.tracebacks.get("out of time")
             lines += ["  " + line for line in (trace or "").split("\n") if line]
-        if operation["questions"] == operation["refused"]:
-            lines.append(f"{name}: nothing was judged: it refused all of {operation['questions']} questions")
+        if operation["untested"]:
+            lines.append(f"{name}: too little was judged: {operation['untested']}")
         if operation["ended"]:
             why = "a function that has not ended cannot be asked again" if guest.interrupted else \
                 "after this nothing can be asked in this process"

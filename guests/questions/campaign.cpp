@@ -11,6 +11,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "guests/questions/kinds.h"
 #include "guests/tissue_arrays.h"
 #include "model/at.h"
 #include "model/error.h"
@@ -101,6 +102,7 @@ void count(KernelCampaign& campaign, const harness::Promises& promises, const Qu
   std::set<int32_t> wrong;  // cases of a batch
   bool fails = false, all_fail = false;
   for (const Verdict& verdict : verdicts) {
+    if (verdict.property == operation.as_drawn && verdict.checked > 0) ++kind.as_drawn;
     if (!promises.cover(verdict.property)) {
       const auto known = std::find_if(campaign.unpromised.begin(), campaign.unpromised.end(),
                                       [&](const Unpromised& u) { return u.property == verdict.property; });
@@ -138,7 +140,25 @@ void count(KernelCampaign& campaign, const harness::Promises& promises, const Qu
   campaign.failed += fails ? 1 : 0;
 }
 
+// A kind of which so many questions were answered, and none was what it says, has not been tested.
+constexpr int64_t kEnoughToBeOne = 10;
+
 }  // namespace
+
+std::string KernelCampaign::untested() const {
+  const int64_t answered = questions - refused;
+  if (answered == 0) return fmt::format("all {} questions were refused", questions);
+  if (!operation->is_simulator()) return "";
+  if (answered * 10 < questions) return fmt::format("{} of {} questions were refused", refused, questions);
+  int64_t cut = 0;
+  for (const KindSummary& kind : kinds) {
+    cut += kind.as_drawn;
+    if (kind.as_drawn == 0 && kind.questions - kind.refused >= kEnoughToBeOne) {
+      return fmt::format("none of {} scenes of the kind '{}' was one", kind.questions - kind.refused, kind.kind);
+    }
+  }
+  return cut == 0 ? fmt::format("in none of {} scenes was the tissue cut as drawn", answered) : "";
+}
 
 std::string name_of_question(int64_t index, int64_t size, const std::string& kind) {
   return size > 0 ? fmt::format("the question of size {} ({})", size, kind)
@@ -150,6 +170,12 @@ harness::Promises promises_of(const PluginInfo& plugin, const OperationDescripti
   harness::Promises promises;
   const std::string words = plugin.promises.value_or(std::string(operation.by_itself));
   promises.words = harness::parse_promises(words, library, "promises");
+  if (!operation.is_simulator()) return promises;
+  // Of a run the judge asks what is promised; this is left.
+  promises.words = harness::Promises{}.words;
+  if (!is_promised(words, oracles::RunPromise::deterministic)) {
+    promises.words &= ~harness::parse_promises("same_bits", library, "promises");
+  }
   return promises;
 }
 
@@ -193,7 +219,10 @@ std::vector<Verdict> judge_answer(Guest& guest, const OperationDescription& oper
   const Answer second = ask(guest, operation, question, !at_end);
   const bool answered = second.kind == Answer::Kind::answered, is_same = answered && second.arrays == answer.arrays;
   if (again) {
-    Verdict same = of_all_cases("determinism", second.text.empty() ? "asked again it answers otherwise" : second.text);
+    std::string how = second.text.empty() ? "asked again it answers otherwise" : second.text;
+    if (answered && !is_same && operation.difference != nullptr)
+      how = operation.difference(question, answer.arrays, second.arrays);
+    Verdict same = of_all_cases("determinism", how);
     same.holds = is_same;
     if (same.holds) {
       same.measured = 0;
@@ -272,7 +301,8 @@ KernelCampaign judge_kernel(Guest& guest, const OperationDescription& operation,
   for (int64_t index = 0; (ordinary < options.cases || index < kinds) && goes_on(); ++index) {
     if (index == kinds) ask_large_ones();
     if (index >= kinds && !goes_on()) break;
-    const Question question = operation.draw(options.seed, index, precision);
+    const Question question = operation.is_simulator() ? operation.draw_for(options.seed, index, guest.plugin())
+                                                       : operation.draw(options.seed, index, precision);
     ordinary += operation.cases_of(question);
     // By turns both ends of every array are guarded, whatever the number of kinds.
     examine(question, index, (index + index / kinds) % 2 == 0);
@@ -501,6 +531,7 @@ nlohmann::json to_json(const KernelCampaign& campaign) {
                         {"size", campaign.operation->size_of(f.simplest)}});
     if (f.size > 0) failures.back()["drawn_size"] = f.size;
   }
+  const bool is_simulator = campaign.operation->is_simulator();
   for (const KindSummary& kind : campaign.kinds) {
     kinds.push_back({{"kind", kind.kind},
                      {"questions", kind.questions},
@@ -509,6 +540,7 @@ nlohmann::json to_json(const KernelCampaign& campaign) {
                      {"failed", kind.failed},
                      {"worst", kind.worst ? to_json(*kind.worst) : json()},
                      {"first_failure", kind.first_failure ? to_json(*kind.first_failure) : json()}});
+    if (is_simulator) kinds.back()["as_drawn"] = kind.as_drawn;
   }
   for (const NotAsked& each : campaign.not_asked) {
     not_asked.push_back(
@@ -526,6 +558,7 @@ nlohmann::json to_json(const KernelCampaign& campaign) {
           {"ended", campaign.ended},
           {"failed", campaign.failed},
           {"failed_cases", campaign.failed_cases},
+          {"untested", campaign.untested()},
           {"seconds", campaign.seconds},
           {"properties", campaign.properties.to_json()},
           {"kinds", std::move(kinds)},

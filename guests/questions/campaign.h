@@ -50,7 +50,8 @@ struct KindSummary {
   };
   std::string kind;
   int64_t questions = 0, cases = 0, refused = 0;
-  int64_t failed = 0;  // cases
+  int64_t failed = 0;    // cases
+  int64_t as_drawn = 0;  // questions that were what the kind says (OperationDescription::as_drawn)
   // The one that fails, else the one that comes nearest to its bound. Nothing where no bound but 0 was met.
   std::optional<Case> worst, first_failure;
 };
@@ -83,8 +84,9 @@ struct KernelCampaign {
   int64_t failed = 0;                   // questions
   int64_t failed_cases = 0;
 
-  // Something was judged, and nothing failed.
-  bool holds() const { return failed == 0 && questions > refused; }
+  // Why so little was judged that nothing is known, or "".
+  std::string untested() const;
+  bool holds() const { return failed == 0 && untested().empty(); }
 };
 
 // "question 5 (a wire)"; large ones by their size.

@@ -17,7 +17,7 @@
 namespace cutproof::guests {
 
 std::span<const OperationDescription> operations() {
-  static const std::array all = {kRotations, kComponents, kSurface, kClusters};
+  static const std::array all = {kRotations, kComponents, kSurface, kClusters, kDissect};
   return all;
 }
 

@@ -4,16 +4,18 @@
 #include <cstdint>
 #include <random>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "guests/questions/question.h"
 #include "model/body.h"
 #include "model/setup.h"
 #include "model/state.h"
+#include "oracles/runs/run.h"
 
 namespace cutproof::guests {
 
-extern const OperationDescription kRotations, kComponents, kSurface, kClusters;
+extern const OperationDescription kRotations, kComponents, kSurface, kClusters, kDissect;
 
 // Neighbouring seeds and indices become unlike each other (SplitMix64; Steele, Lea, Flood 2014).
 uint64_t mixed(uint64_t seed, int64_t index);
@@ -30,6 +32,9 @@ class Random {
  private:
   std::mt19937_64 engine_;
 };
+
+// Whether words that a plugin promises by hold this one of runs (docs/reference/run.md); "*" is all.
+bool is_promised(std::string_view words, oracles::RunPromise promise);
 
 // Of a question about one body.
 int64_t one_body(const Question& question);

@@ -7,8 +7,9 @@
 #include <string_view>
 #include <vector>
 
-#include "guests/wire.h"
+#include "guests/guest.h"
 #include "model/arrays.h"
+#include "model/io/array_file.h"
 #include "model/precision.h"
 #include "model/verdict.h"
 
@@ -65,6 +66,16 @@ struct OperationDescription {
   std::vector<std::string> (*large_kinds)() = nullptr;
   std::span<const int64_t> sizes = {};
   Question (*draw_large)(uint64_t seed, int64_t kind, int64_t size, Precision precision) = nullptr;
+  // Of a whole simulator, whose promises are those of runs. Null for all others.
+  // `draw` within what a plugin states; throws InputError for words of its that there are not.
+  Question (*draw_for)(uint64_t seed, int64_t index, const PluginInfo& plugin) = nullptr;
+  // The property of which a verdict has looked at something where a question was what its kind says.
+  std::string_view as_drawn = {};
+  // Where two answers to a question part first.
+  std::string (*difference)(const Question& question, const Arrays& one, const Arrays& other) = nullptr;
+  // An answer as files of a run (docs/reference/run.md); nothing if it is none.
+  std::vector<io::ArrayFile> (*files)(const Question& question, const Arrays& answers, Precision precision) = nullptr;
+  bool is_simulator() const { return draw_for != nullptr; }
 };
 
 inline constexpr int64_t kMostSize = int64_t{1} << 25;  // of a large question

@@ -27,7 +27,7 @@ void say(const char* name, long long value) {
 int main() {
   SAY(wire::kProtocol), SAY(wire::kPage), SAY(wire::kArrayBytes), SAY(wire::kArenaBytes), SAY(wire::kArenaCount);
   SAY(wire::kMemoryBytes), SAY(wire::kLeastGap), SAY(wire::kCanary), SAY(wire::kDeviceCanary), SAY(wire::kMostArrays);
-  SAY(wire::kMostGrown), SAY(wire::rotations), SAY(wire::components), SAY(wire::surface), SAY(wire::clusters);
+  SAY(wire::kMostGrown), SAY(wire::rotations), SAY(wire::components), SAY(wire::surface), SAY(wire::clusters), SAY(wire::dissect);
   SAY(wire::Role::given), SAY(wire::Role::answer), SAY(wire::Role::grown), SAY(wire::Role::setup);
   SAY(wire::Outcome::answered), SAY(wire::Outcome::refused), SAY(wire::Outcome::broke_a_rule);
   SAY(wire::Outcome::device_failed), SAY(wire::Greeting::ready);
@@ -54,6 +54,6 @@ int main() {
   MEMBER(Hello, protocol), MEMBER(Hello, greeting), MEMBER(Hello, memory), MEMBER(Hello, operations);
   MEMBER(Hello, spans), MEMBER(Hello, device), MEMBER(Hello, real), MEMBER(Hello, has_promises);
   MEMBER(Hello, remembers_faults), MEMBER(Hello, request_bytes), MEMBER(Hello, reply_bytes), MEMBER(Hello, name);
-  MEMBER(Hello, version), MEMBER(Hello, promises), MEMBER(Hello, text);
+  MEMBER(Hello, version), MEMBER(Hello, promises), MEMBER(Hello, limits), MEMBER(Hello, text);
   std::printf("}\n");
 }

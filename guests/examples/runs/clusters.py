@@ -38,6 +38,7 @@ def simulate(body, blade, frames, fault=None):
     regions = [np.flatnonzero(abs(nodes - node).max(1) <= 1) for node in nodes]
     edges = scene.grid_edges(nodes)
     broken, removed = np.zeros(len(edges), bool), np.zeros(n, bool)
+    held = body.get("held", np.zeros(n, bool))
     if fault == "reset":  # the last body's cuts are still there
         broken = kept.setdefault("broken", broken)
     clusters, region_of = split(regions, edges, ~broken, removed)
@@ -73,7 +74,7 @@ def simulate(body, blade, frames, fault=None):
             order = slice(None) if fault != "race" else np.random.default_rng().permutation(len(member))
             force = np.zeros_like(x)
             np.add.at(force, member[order], add[order])
-            v = np.where(removed[:, None], 0, v + dt * (force / mass[:, None] + body["gravity"]))
+            v = np.where((removed | held)[:, None], 0, v + dt * (force / mass[:, None] + body["gravity"]))
             x = x + dt * v
         blade_is_there = np.isfinite(blade[frame]).any()
         hit = scene.crossed(blade[frame], *x[edges.T], bounded=fault != "tear_elsewhere", one_sided=fault == "mirror")

@@ -25,6 +25,7 @@ def simulate(body, blade, frames, fault=None):
     mu, lame = body["stiffness"] / 2.6, body["stiffness"] * 0.3 / (1.3 * 0.4)  # Poisson's ratio 0.3
     edges = scene.grid_edges(body["nodes"])
     broken, removed = np.zeros(len(edges), bool), np.zeros(n, bool)
+    held = body.get("held", np.zeros(n, bool))
     if fault == "reset":  # the last body's cuts are still there
         broken = kept.setdefault("broken", broken)
     for frame in range(frames):
@@ -58,7 +59,7 @@ def simulate(body, blade, frames, fault=None):
             least = 0 if fault != "momentum_from_nothing" else mass.mean() / 10  # light nodes are skipped
             fast = np.where(heavy > least, fast / np.where(heavy > 0, heavy, 1) + dt * body["gravity"], 0)
             fast = weight[:, :, None] * fast[node].reshape(n, 27, 3)
-            v, affine = fast.sum(1), 4 / cell**2 * np.swapaxes(fast, 1, 2) @ way
+            v, affine = np.where(held[:, None], 0, fast.sum(1)), 4 / cell**2 * np.swapaxes(fast, 1, 2) @ way
             if fault == "spin_lost":  # an outer product the wrong way round
                 affine = np.swapaxes(affine, 1, 2)
             x, deformation = x + dt * v, deformation + dt * affine @ deformation

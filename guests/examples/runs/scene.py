@@ -14,6 +14,7 @@ import sys
 import numpy as np
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "python"))  # or beside this file, which comes first
+import cutproof_run  # noqa: E402
 
 
 def block(size=(7, 4, 3), spacing=0.01, seed=1, kerf=0.0):
@@ -123,6 +124,22 @@ def kicked(body, frame, v, piece):
     """The velocities, those of the piece of particle 0 changed if this is the frame of a kick."""
     when, by = body.get("kick", (-1, None))
     return np.where((piece() == piece()[0])[:, None], v + by, v) if frame == when else v
+
+
+def dissection(simulate, fault=None, kerf=0.0):
+    """The simulator as `cutproof.judge(dissect=...)` takes it. Stiffness and substeps are as those of block(), whatever
+    the size of a spacing; `kerf` is in spacings."""
+    def dissect(asked):
+        body = {name: getattr(asked, name) for name in ("rest", "nodes", "mass", "velocities", "spacing", "gravity",
+                                                        "frame_time", "held")}
+        body.update(stiffness=2e7 * asked.spacing**2, steps=int(np.ceil(1000 * asked.frame_time)),
+                    kerf=kerf * asked.spacing, cells=asked.tetrahedra)
+        for frame in simulate(body, asked.blade, asked.frames, fault):
+            if "labels" in frame:
+                frame["groups"] = cutproof_run.grid_groups(frame["positions"], 0, 2 * asked.spacing, "quadratic",
+                                                           frame.pop("labels"), frame["alive"])
+            yield dict(frame, steps=body["steps"])
+    return dissect
 
 
 def arguments(about, faults, at=0.4):

@@ -28,6 +28,7 @@ def simulate(body, blade, frames, fault=None):
     stiffness, damping = body["stiffness"] * h, 0.2 * np.sqrt(body["stiffness"] * h * mass.mean())
     gravity = body["gravity"] if fault != "units" else np.array([0, 0, -9.81])
     broken, removed = np.zeros(len(ends), bool), np.zeros(len(x), bool)
+    held = body.get("held", np.zeros(len(x), bool))
     if fault == "reset":  # the last body's cuts are still there
         broken = kept.setdefault("broken", broken)
     on = ~broken
@@ -56,7 +57,7 @@ def simulate(body, blade, frames, fault=None):
                 force[j] -= pull
             else:
                 np.add.at(force, j, -pull)
-            v = np.where(removed[:, None], 0, v + dt * (force / mass + gravity))
+            v = np.where((removed | held)[:, None], 0, v + dt * (force / mass + gravity))
             x = x + dt * v
         hit = scene.crossed(blade[frame], x[i], x[j], bounded=fault != "tear_elsewhere", one_sided=fault == "mirror")
         first = ends[hit & ~broken][:1].ravel()  # of the springs that are cut now

@@ -44,6 +44,7 @@ def simulate(body, blade, frames, fault=None):
     pairs = np.array([(a, b) for a in range(len(cells)) for b in range(a + 1, len(cells))
                       if len(set(cells[a]) & set(cells[b])) == 3])
     broken, split_so_far, first_cells = np.zeros(len(pairs), bool), 0, cells
+    held = body.get("held", np.zeros(len(rest), bool))
     if fault == "reset":  # the last body's cuts are still there
         broken = kept.setdefault("broken", broken)
     for frame in range(frames):
@@ -70,7 +71,7 @@ def simulate(body, blade, frames, fault=None):
             order = slice(None) if fault != "race" else np.random.default_rng().permutation(len(ends))
             force = np.zeros_like(x)
             np.add.at(force, ends[order], pull[order])
-            v = v + dt * (force / mass[:, None] + body["gravity"])
+            v = np.where(held[origin, None], 0, v + dt * (force / mass[:, None] + body["gravity"]))
             if fault == "heals" and np.isnan(blade[frame]).all():  # new vertices stick to what they were split from
                 root = np.where(np.linalg.norm(x - x[origin], axis=1) < h / 2, origin, np.arange(len(x)))
                 v = np.stack([np.bincount(root, mass * a, len(x)) for a in v.T], 1)[root] / np.bincount(root, mass)[

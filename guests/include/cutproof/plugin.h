@@ -55,6 +55,31 @@ typedef struct cutproof_state { /* docs/reference/recording.md; n particles, m c
   cutproof_array* reach;                                      /* skin: real [k] h, from the owner at rest, in (0, 1) */
 } cutproof_state;
 
+typedef struct cutproof_scene { /* a body at rest, and what becomes of it; n particles */
+  uint32_t size;
+  int32_t frames, blades;        /* the first frame is the start */
+  double frame_time, gravity[3]; /* s, m/s^2 */
+  const cutproof_tissue* tissue;
+  const cutproof_array *velocity, *held;        /* at the start: real [n x 3] m/s; u8 [n], 1: it stays where it is */
+  const cutproof_array *tetrahedra, *hexahedra; /* of the grid: i32 [.. x 4]; [.. x 8] in VTK's order */
+  /* real [frames * blades x 12] m, frame by frame: the corners of what a blade sweeps on the way to a frame, where
+   * that lies at its end; NaN: nothing. */
+  const cutproof_array* blade;
+} cutproof_scene;
+
+typedef struct cutproof_run { /* docs/reference/run.md; p: particles of all frames, one frame after the other */
+  uint32_t size;
+  /* Without rows: not given. All but position may be. */
+  cutproof_array *steps, *damping;                     /* i64 [1] substeps in a frame; real [1] 1/s */
+  cutproof_array* particles;                           /* i32 [frames] how many; not given: always n */
+  cutproof_array *position, *velocity, *spin;          /* real [p x 3] m, m/s, kg m^2/s */
+  cutproof_array *mass, *alive, *parent;               /* real [p] kg; u8 [p]; i32 [p] */
+  cutproof_array *contact_impulse, *energy;            /* real [frames x 3] kg m/s, real [frames] J */
+  cutproof_array* group_count;                         /* i32 [frames] coupling groups; -1: as in the frame before */
+  cutproof_array *offsets, *members, *weights;         /* of all that are given: i64 [groups + 1], i32, real */
+  cutproof_array *cell_count, *tetrahedra, *hexahedra; /* i32 [frames], -1 likewise; i32 [.. x 4] or [.. x 8] */
+} cutproof_run;
+
 typedef struct cutproof_host {
   uint32_t size;
   uint32_t abi;
@@ -97,6 +122,10 @@ typedef struct cutproof_plugin {
   int (*can_run)(int first, int last);
   int (*load)(const cutproof_host* host, void* self, const cutproof_tissue* tissue, const cutproof_state* state);
   int (*run)(const cutproof_host* host, void* self, int first, int last, cutproof_state* state);
+
+  /* A whole simulator. `limits`: words of docs/reference/plugins.md that say what it takes; null: all that is asked. */
+  const char* limits;
+  int (*dissect)(const cutproof_host* host, void* self, const cutproof_scene* scene, cutproof_run* run);
 } cutproof_plugin;
 
 #if defined(__GNUC__)

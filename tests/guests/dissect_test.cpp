@@ -1,0 +1,229 @@
+// Whole simulators: a right one holds, and each way of being wrong is named for what it is.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "guests/questions/campaign.h"
+#include "model/at.h"
+#include "model/error.h"
+#include "model/vec.h"
+
+namespace cutproof::guests::dissect_test {
+namespace {
+
+const OperationDescription& dissect() { return *find_operation("dissect"); }
+
+KernelCampaign judged(const std::string& mode, KernelCampaignOptions options) {
+  Guest guest({PLUGIN_springs, mode, 20});
+  return judge_kernel(guest, dissect(), promises_of(guest.plugin(), dissect(), ""), options, {});
+}
+
+PluginInfo with_limits(const std::string& words) {
+  PluginInfo plugin;
+  plugin.name = "a plugin";
+  plugin.precision = Precision::binary64;
+  plugin.limits = words;
+  return plugin;
+}
+
+const Array& given(const Question& question, const char* name) { return *find_array(question.given, name); }
+
+TEST(Dissect, ARightSimulatorHoldsInScenesOfEveryKind) {
+  const KernelCampaign campaign = judged("right", {.seed = 3, .cases = 400});
+  for (const KernelFailure& failure : campaign.failures) {
+    ADD_FAILURE() << failure.verdict.property << ": " << failure.verdict.witness.text;
+  }
+  EXPECT_TRUE(campaign.holds()) << campaign.untested();
+  EXPECT_EQ(campaign.refused, 0);
+  EXPECT_EQ(campaign.kinds.size(), dissect().kinds().size());
+  for (const KindSummary& kind : campaign.kinds) EXPECT_GT(kind.as_drawn, kind.questions / 4) << kind.kind;
+  for (const char* const property :
+       {"no coupling across pieces", "pieces coupled within", "linear momentum", "centre of mass", "angular momentum",
+        "no teleport", "run as asked", "velocities as asked", "what is held stays", "determinism"}) {
+    const auto& all = campaign.properties.all();
+    const auto found = std::find_if(all.begin(), all.end(), [&](const auto& p) { return p.property == property; });
+    ASSERT_NE(found, all.end()) << property;
+    EXPECT_GT(found->judged, 50) << property;
+  }
+}
+
+TEST(Dissect, EachFaultFailsThePropertyThatIsNamed) {
+  const std::pair<const char*, const char*> faults[] = {{"heals", "no coupling across pieces"},
+                                                        {"uncut", "no coupling across pieces"},
+                                                        {"elsewhere", "pieces coupled within"},
+                                                        {"nothing_left", "pieces coupled within"},
+                                                        {"momentum", "linear momentum"},
+                                                        {"weightless", "linear momentum"},
+                                                        {"drops", "what is held stays"},
+                                                        {"beside", "run as asked"},
+                                                        {"short", "run as asked"},
+                                                        {"offsets", "run as asked"},
+                                                        {"index", "run well formed"},
+                                                        {"last_bit", "determinism"}};
+  for (const auto& [mode, property] : faults) {
+    const KernelCampaign campaign = judged(mode, {.cases = 40, .simplify = 0});
+    const bool is_found = std::any_of(campaign.failures.begin(), campaign.failures.end(),
+                                      [&](const KernelFailure& f) { return f.verdict.property == property; });
+    EXPECT_TRUE(is_found) << mode;
+    EXPECT_FALSE(campaign.holds()) << mode;
+  }
+}
+
+TEST(Dissect, AFailureIsShrunkSavedAndFailsAgain) {
+  for (const char* const mode : {"heals", "elsewhere", "momentum", "drops"}) {
+    SCOPED_TRACE(mode);
+    Guest guest({PLUGIN_springs, mode, 20});
+    const harness::Promises promises = promises_of(guest.plugin(), dissect(), "");
+    const KernelCampaign campaign = judge_kernel(guest, dissect(), promises, {.seed = 2, .cases = 40}, {});
+    ASSERT_FALSE(campaign.failures.empty());
+    for (const KernelFailure& failure : campaign.failures) {
+      EXPECT_EQ(failure.of_simplest.property, failure.verdict.property);
+      EXPECT_LE(given(failure.simplest, "blades").integer(0), 1);
+      EXPECT_LE(given(failure.simplest, "rest").rows(), 8) << failure.verdict.property;
+      SavedQuestion saved;
+      saved.operation = "dissect";
+      saved.question = failure.simplest;
+      saved.precision = Precision::binary64;
+      const SavedQuestion read = question_from_json(to_json(saved), "a file");
+      EXPECT_EQ(to_json(read), to_json(saved));
+      bool fails = false;
+      for (const Verdict& verdict : judge_answer(guest, dissect(), question_of(read), failure.at_end, false)) {
+        fails |= !verdict.holds && verdict.property == failure.verdict.property;
+      }
+      EXPECT_TRUE(fails);
+    }
+  }
+}
+
+TEST(Dissect, TellsWhereTwoRunsPart) {
+  const KernelCampaign campaign = judged("last_bit", {.cases = 10, .simplify = 0});
+  ASSERT_FALSE(campaign.failures.empty());
+  const std::string& text = campaign.failures.front().verdict.witness.text;
+  EXPECT_TRUE(text.starts_with("run again, particle ")) << text;
+  const int64_t last = given(campaign.failures.front().simplest, "blade").rows() /
+                           given(campaign.failures.front().simplest, "blades").integer(0) -
+                       1;
+  EXPECT_TRUE(text.ends_with("in frame " + std::to_string(last))) << text;
+}
+
+TEST(Dissect, WhereNearlyEverythingIsRefusedNothingIsKnown) {
+  EXPECT_EQ(judged("refuse", {.cases = 20}).untested(), "all 20 questions were refused");
+  const KernelCampaign most = judged("refuse_most", {.cases = 100});
+  EXPECT_EQ(most.failed, 0);
+  EXPECT_GT(most.questions, most.refused);
+  EXPECT_FALSE(most.holds());
+  EXPECT_NE(most.untested().find("questions were refused"), std::string::npos) << most.untested();
+}
+
+TEST(Dissect, AKindOfWhichNoSceneIsOneIsNotTested) {
+  const auto kind = [](const char* name, int64_t questions, int64_t as_drawn) {
+    KindSummary summary;
+    summary.kind = name;
+    summary.questions = questions;
+    summary.as_drawn = as_drawn;
+    return summary;
+  };
+  KernelCampaign campaign;
+  campaign.operation = &dissect();
+  campaign.questions = 30;
+  campaign.kinds = {kind("cut through", 20, 1), kind("curved cut", 10, 0)};
+  EXPECT_EQ(campaign.untested(), "none of 10 scenes of the kind 'curved cut' was one");
+  campaign.kinds.back().as_drawn = 1;
+  EXPECT_TRUE(campaign.holds());
+  campaign.kinds = {kind("cut through", 9, 0)};
+  EXPECT_EQ(campaign.untested(), "in none of 30 scenes was the tissue cut as drawn");
+}
+
+TEST(Dissect, ScenesAreWithinTheLimits) {
+  const auto count = [](const Question& question, const auto& is_one) {
+    int64_t most = 0;
+    const int64_t blades = given(question, "blades").integer(0), frames = given(question, "blade").rows() / blades;
+    for (int64_t f = 0; f < frames; ++f) {
+      int64_t here = 0;
+      for (int64_t b = 0; b < blades; ++b) here += is_one(given(question, "blade").number(12 * (f * blades + b)));
+      most = std::max(most, here);
+    }
+    return most;
+  };
+  const auto is_there = [](double x) { return std::isfinite(x); };
+  int64_t held = 0, at_once = 0, smallest = 100, diagonals = 0;
+  for (int64_t index = 0; index < 300; ++index) {
+    const Question free = dissect().draw_for(9, index, with_limits(""));
+    EXPECT_LE(given(free, "rest").rows(), 60);
+    EXPECT_LE(given(free, "blade").rows() / given(free, "blades").integer(0), 12);
+    held += std::ranges::count(given(free, "held").of<uint8_t>(), 1);
+    at_once = std::max(at_once, count(free, is_there));
+    smallest = std::min(smallest, given(free, "rest").rows());
+    EXPECT_GE(count(free, is_there), 1) << free.kind;
+
+    const Question limited =
+        dissect().draw_for(9, index, with_limits("particles=30 cells one_blade no_grips cut_resolution=0.5"));
+    const auto corners = given(limited, "tetrahedra").of<int32_t>();
+    EXPECT_LE(given(limited, "rest").rows(), 30);
+    EXPECT_EQ(std::set<int32_t>(corners.begin(), corners.end()).size(), at(given(limited, "rest").rows()));
+    EXPECT_EQ(std::ranges::count(given(limited, "held").of<uint8_t>(), 1), 0);
+    EXPECT_EQ(count(limited, is_there), 1) << limited.kind;
+    EXPECT_EQ(find_array(limited.known, "cut_resolution")->number(0), 0.5 * given(limited, "spacing").number(0));
+
+    const Question more = dissect().draw_for(9, index, with_limits("diagonals"));
+    diagonals += given(more, "edge_ends").rows() > given(free, "edge_ends").rows();
+  }
+  EXPECT_GT(held, 100);
+  EXPECT_EQ(at_once, 2);
+  EXPECT_LE(smallest, 4);
+  EXPECT_GT(diagonals, 200);
+  for (const char* const wrong : {"one_knife", "particles", "particles=7", "gap=x", "gap=1x", "cells=1"}) {
+    EXPECT_THROW(dissect().draw_for(1, 0, with_limits(wrong)), InputError) << wrong;
+  }
+  // Two flat strokes side by side, in a frame that has both.
+  int64_t measured = 0;
+  for (int64_t index = 5; index < 300; index += 10) {
+    const Question apart = dissect().draw_for(9, index, with_limits("gap=3"));
+    ASSERT_EQ(apart.kind, "thin remains");
+    const auto blade = given(apart, "blade").of<double>();
+    for (std::size_t k = 0; k < blade.size(); k += 24) {
+      const auto corner = [&](std::size_t c) {
+        return Vec3{blade[k + 3 * c], blade[k + 3 * c + 1], blade[k + 3 * c + 2]};
+      };
+      if (!is_there(blade[k]) || !is_there(blade[k + 12])) continue;
+      const Vec3 normal = cross(corner(1) - corner(0), corner(2) - corner(0));
+      const double distance = std::abs(dot(corner(4) - corner(0), normal)) / norm(normal);
+      EXPECT_NEAR(distance, 3 * given(apart, "spacing").number(0), 1e-9);
+      ++measured;
+    }
+  }
+  EXPECT_GT(measured, 10);
+  Guest guest({PLUGIN_springs_of_another_limit, "", 20});
+  try {
+    judge_kernel(guest, dissect(), promises_of(guest.plugin(), dissect(), ""), {.cases = 1}, {});
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("there is no limit 'one_knife'"), std::string::npos) << error.what();
+  }
+}
+
+// Of cells all are positive, whichever way they are counted.
+TEST(Dissect, CellsOfAGridHaveAPositiveVolume) {
+  for (int64_t index = 0; index < 20; ++index) {
+    const Question question = dissect().draw_for(4, index, with_limits("cells"));
+    const auto rest = given(question, "rest").of<double>();
+    const auto place = [&](int32_t i) { return Vec3{rest[3 * at(i)], rest[3 * at(i) + 1], rest[3 * at(i) + 2]}; };
+    const double h = given(question, "spacing").number(0);
+    const auto tetrahedra = given(question, "tetrahedra").of<int32_t>();
+    ASSERT_FALSE(tetrahedra.empty());
+    EXPECT_EQ(tetrahedra.size() / 24, given(question, "hexahedra").of<int32_t>().size() / 8);
+    for (std::size_t k = 0; k < tetrahedra.size(); k += 4) {
+      const Vec3 a = place(tetrahedra[k]);
+      const double volume =
+          dot(place(tetrahedra[k + 1]) - a, cross(place(tetrahedra[k + 2]) - a, place(tetrahedra[k + 3]) - a)) / 6;
+      EXPECT_NEAR(volume, h * h * h / 6, 1e-9 * h * h * h);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace cutproof::guests::dissect_test
