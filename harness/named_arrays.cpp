@@ -57,7 +57,9 @@ bool fits_as_list(const Array& array, const Shape& wanted) {
   if (wanted.size() == 1 && array.shape.size() == 2 && std::min(array.shape[0], array.shape[1]) == 1) {
     return fits({array.count()}, wanted);
   }
-  return array.shape == Shape{0} && !wanted.empty() && wanted.front() <= 0;
+  // Of extents that may be any, whoever asks reads the array's: an empty list has the first alone.
+  return array.shape == Shape{0} && !wanted.empty() && wanted.front() <= 0 &&
+         std::none_of(wanted.begin() + 1, wanted.end(), [](int64_t extent) { return extent < 0; });
 }
 
 // Of a file that its own program calls v7.3, or that wrote column by column and did not say so.

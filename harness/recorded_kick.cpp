@@ -111,11 +111,11 @@ RecordedKick recorded_kick_of(const io::ArrayFile& contents, const std::string& 
   RecordedKick kick;
   oracles::KickedRuns& runs = kick.runs;
   const Array& positions = in.require("positions", {-1, -1, 3});
+  if (positions.count() == 0) {
+    in.refuse("positions", "There are no frames, or no particles.", "Write at least one of both.");
+  }
   if (positions.shape[1] > std::numeric_limits<int32_t>::max()) {
     in.refuse("positions", "There are more particles than 32-bit numbers can name.", "Write a smaller body.");
-  }
-  if (positions.shape[0] == 0 || positions.shape[1] == 0) {
-    in.refuse("positions", "There are no frames, or no particles.", "Write at least one of both.");
   }
   runs.frames = positions.shape[0];
   runs.particles = static_cast<int32_t>(positions.shape[1]);

@@ -626,6 +626,7 @@ TEST(Kick, ThatCannotBeUnderstoodIsRefused) {
          replace(f, make_array("positions", {0, 6, 3}, Doubles()));
        },
        {"positions", "no frames"}},
+      {[&](auto& f) { replace(f, make_array("positions", {0}, Doubles())); }, {"positions", "(0,)"}},
       {[&](auto& f) {
          replace(f, make_array("kicked", {9, 6, 3}, Doubles(162)));
        },
