@@ -31,6 +31,7 @@ struct CheckOptions {
   std::string recording;
   std::string depth{name_of(harness::Depth::motion)};
   std::string json, junit, report;
+  bool as_run = false;
   std::string again;  // the command line
 };
 
@@ -87,23 +88,26 @@ int check_recording(const CheckOptions& options) {
 
 int check(const CheckOptions& options) {
   const bool has_segments = io::RunSegments::has_segments(options.recording);
-  if (!has_segments && !io::is_array_file(options.recording)) return check_recording(options);
-  if (!options.report.empty()) {
-    refuse("--report", "of a file of arrays no page is made",
-           "leave it out; --json has every verdict with its witness");
-  }
+  const bool is_recording = !has_segments && !io::is_array_file(options.recording);
+  if (is_recording && !options.as_run) return check_recording(options);
   depth_asked(options.depth);  // there is no motion to leave out, but a depth that is none is refused all the same
-  const StateReports reports = {options.json, options.junit, options.again};
-  if (has_segments) {
-    io::RunSegments segments(options.recording);
-    return check_run(segments, options.recording, reports);
+  const StateReports reports = {options.json, options.junit, options.report, options.again};
+  if (is_recording) {
+    open_recording(options.recording);  // one that contradicts itself is refused here, too
+    return check_run(io::RunSegments::of_recording(options.recording), options.recording, reports);
   }
+  if (has_segments) return check_run(io::RunSegments(options.recording), options.recording, reports);
   io::ArrayFile contents = io::read_array_file(options.recording);
-  if (!io::RunSegments::is_segment(contents)) return check_state(contents, options.recording, reports);
-  std::vector<io::ArrayFile> only(1);
-  only.front() = std::move(contents);
-  io::RunSegments segments(options.recording, std::move(only));
-  return check_run(segments, options.recording, reports);
+  if (io::RunSegments::is_segment(contents)) {
+    std::vector<io::ArrayFile> only(1);
+    only.front() = std::move(contents);
+    return check_run(io::RunSegments(options.recording, std::move(only)), options.recording, reports);
+  }
+  if (options.as_run) refuse("--as-run", "this file holds one state", "leave it out");
+  if (!options.report.empty()) {
+    refuse("--report", "of a state no page is made", "leave it out; --json has every verdict with its witness");
+  }
+  return check_state(contents, options.recording, reports);
 }
 
 }  // namespace
@@ -116,6 +120,8 @@ void add_check(CLI::App& program, Work& work) {
       ->required()
       ->type_name("RECORDING");
   add_check_depth(*command, options->depth, "how much is judged");
+  command->add_flag("--as-run", options->as_run,
+                    "judge a recording as any simulator's run, whatever its method: without its scene");
   add_json(*command, options->json, "write verdicts and counts");
   add_junit(*command, options->junit);
   add_report_option(*command, options->report);

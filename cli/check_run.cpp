@@ -4,19 +4,39 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "cli/commands.h"
 #include "cli/findings.h"
 #include "cli/output.h"
 #include "cli/progress.h"
+#include "cli/report_page.h"
 #include "cli/screen.h"
 #include "cli/terminal.h"
 #include "harness/foreign_run.h"
+#include "harness/run_states.h"
+#include "model/io/atomic_file.h"
 #include "model/io/verdict_json.h"
+#include "report/page.h"
 
 namespace cutproof::cli {
 
 namespace {
+
+// "2 pieces of 60 and 60 particles by the blade's sweep"; of many, the largest.
+std::string in_words(const oracles::RunPieces& pieces) {
+  if (pieces.units == 0) return "the run has no tissue that pieces could be told of";
+  std::string sizes;
+  for (std::size_t k = 0; k < std::min<std::size_t>(pieces.sizes.size(), 5); ++k) {
+    sizes += (k == 0 ? "" : ", ") + std::to_string(pieces.sizes[k]);
+  }
+  if (pieces.sizes.size() > 5) sizes += ", …";
+  std::string text =
+      fmt::format("{} {} by the blade's sweep ({})", pieces.pieces, pieces.pieces == 1 ? "piece" : "pieces", sizes);
+  if (pieces.at_most > pieces.pieces) text += fmt::format(", perhaps {}", pieces.at_most);
+  if (pieces.coupled > 0) text += fmt::format("; {} coupled", pieces.coupled);
+  return text;
+}
 
 nlohmann::json to_json(const std::string& file, const harness::JudgedRun& judged) {
   nlohmann::json not_judged = nlohmann::json::array();
@@ -41,7 +61,9 @@ nlohmann::json to_json(const std::string& file, const harness::JudgedRun& judged
             {"edges_surely_cut", pieces.surely_cut},
             {"edges_perhaps_cut", pieces.perhaps_cut},
             {"beside_the_cut", pieces.beside},
-            {"coupled", pieces.coupled}}},
+            {"coupled", pieces.coupled},
+            {"last_cut", pieces.last_cut < 0 ? nlohmann::json() : nlohmann::json(pieces.last_cut)},
+            {"in_words", in_words(pieces)}}},
           {"arrays", judged.given},
           {"single_precision", judged.single_precision},
           {"verdicts", io::verdicts_json(judged.verdicts)},
@@ -50,32 +72,45 @@ nlohmann::json to_json(const std::string& file, const harness::JudgedRun& judged
           {"notes", judged.notes}};
 }
 
-// "2 pieces of 60 and 60 particles by the blade's sweep"; of many, the largest.
-std::string in_words(const oracles::RunPieces& pieces) {
-  if (pieces.units == 0) return "the run has no tissue that pieces could be told of";
-  std::string sizes;
-  for (std::size_t k = 0; k < std::min<std::size_t>(pieces.sizes.size(), 5); ++k) {
-    sizes += (k == 0 ? "" : ", ") + std::to_string(pieces.sizes[k]);
-  }
-  if (pieces.sizes.size() > 5) sizes += ", …";
-  std::string text =
-      fmt::format("{} {} by the blade's sweep ({})", pieces.pieces, pieces.pieces == 1 ? "piece" : "pieces", sizes);
-  if (pieces.at_most > pieces.pieces) text += fmt::format(", perhaps {}", pieces.at_most);
-  if (pieces.coupled > 0) text += fmt::format("; {} coupled", pieces.coupled);
-  return text;
+void write_page_of(const std::string& file, const harness::JudgedRun& judged, harness::PiecesOverTime& pieces,
+                   const nlohmann::json& document, const StateReports& reports) {
+  harness::RunStates states([&] { return io::RunSegments::of(file); }, judged);
+  const auto particles = static_cast<int32_t>(judged.particles_at_end);
+  const report::Source source = {
+      states.setup(), judged.frames,
+      [&](int64_t frame) {
+        return io::Snapshot{Stage::skin, states.after(frame)};
+      },
+      [&](int64_t frame) {
+        const State& state = states.after(frame);
+        report::FrameOfRun of_run = {pieces.after(frame, particles), states.swept(), states.time()};
+        for (std::size_t i = 0; i < state.alive.size(); ++i) {
+          if (state.alive[i] == 0) of_run.piece[i] = -1;
+        }
+        return of_run;
+      }};
+  io::write_text(reports.page,
+                 report::page(source, report::results_of(document, reports.page), reports.again, kVersion));
 }
 
 }  // namespace
 
-int check_run(io::RunSegments& segments, const std::string& file, const StateReports& reports) {
+int check_run(io::RunSegments segments, const std::string& file, const StateReports& reports) {
   require_writable(reports.json);
   require_writable(reports.junit);
+  require_report(reports.page);
+  harness::PiecesOverTime pieces;
   const harness::JudgedRun judged = [&] {
     Progress progress("frame", 0);
-    return harness::judge_run(segments, [&](int64_t frame) { progress.show(frame + 1, "judging"); });
+    return harness::judge_run(std::move(segments), [&](int64_t frame, const oracles::RunJudge& judge) {
+      if (!reports.page.empty()) pieces.add(judge.piece_of_particles());
+      progress.show(frame + 1, "judging");
+    });
   }();
-  write_document(reports.json, to_json(file, judged));
-  const Judging judging{"cutproof check", "cutproof.check.run", reports.again};
+  const nlohmann::json document = to_json(file, judged);
+  write_document(reports.json, document);
+  if (!reports.page.empty()) write_page_of(file, judged, pieces, document, reports);
+  const Judging judging{"cutproof check", "cutproof.check.run", reports.again, Judging::Of::frames};
   say("run {}: {} frames of {} particles; {}\n", file, judged.frames, judged.particles_at_end, in_words(judged.pieces));
   Shown shown{reports.again};
   shown.in_stages = false;

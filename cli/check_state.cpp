@@ -62,11 +62,13 @@ void show_judged(const std::vector<Verdict>& verdicts, const std::vector<harness
     others.emplace_back(each.property, each.why);
     cases.push_back({each.property, judging.class_name, 0, io::JunitOutcome::skipped, "not judged: " + each.why});
   }
-  write_junit(reports.junit, judging, 0, std::move(cases));
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - reports.begun;
+  write_junit(reports.junit, judging, seconds.count(), std::move(cases));
   print_verdicts(verdicts, shown);
   print_grouped(undecided("Not judged"), others);
   print_notes(notes);
   print_written(reports.json);
+  print_written(reports.page);
   print_conclusion(verdicts, shown, "what was judged holds.");
   print_annotations(failures_of(verdicts, judging));
 }
@@ -77,7 +79,7 @@ int check_state(const io::ArrayFile& contents, const std::string& file, const St
   require_writable(reports.junit);
   const harness::ForeignVerdicts judged = harness::judge_foreign_state(foreign);
   write_document(reports.json, to_json(file, foreign, judged));
-  const Judging judging{"cutproof check", "cutproof.check.state", reports.again};
+  const Judging judging{"cutproof check", "cutproof.check.state", reports.again, Judging::Of::state};
   say("state {}: {} particles in {} clusters, {}{}\n", file, foreign.state.x.size(), foreign.state.clusters.count(),
       foreign.given.contains("nodes") ? "on a grid" : "as a graph", judged.pieces ? "; " + judged.pieces_in_words : "");
   Shown shown{reports.again};

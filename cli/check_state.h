@@ -1,5 +1,6 @@
 // `cutproof check` of a file of arrays: one state that somebody else's simulator wrote.
 #pragma once
+#include <chrono>
 #include <string>
 #include <vector>
 
@@ -11,8 +12,9 @@
 namespace cutproof::cli {
 
 struct StateReports {
-  std::string json, junit;  // files; empty: none
-  std::string again;        // the command line
+  std::string json, junit, page;  // files; empty: none
+  std::string again;              // the command line
+  std::chrono::steady_clock::time_point begun = std::chrono::steady_clock::now();
 };
 
 // Of a file that was judged: writes JUnit, prints the verdicts and what was not judged.

@@ -72,19 +72,6 @@ std::string why_not(const ForeignState& foreign, const oracles::Property& proper
   return "";
 }
 
-Verdict closed(const ForeignState& foreign, bool surface_alone) {
-  const Skin& skin = surface_alone ? foreign.loose_skin : foreign.state.skin;
-  Verdict verdict = oracles::closed_surface(skin);
-  const auto& alive = foreign.state.alive;
-  if (skin.triangles.empty() && std::find(alive.begin(), alive.end(), 1) != alive.end()) {
-    verdict.holds = false;
-    verdict.vacuous.clear();
-    verdict.measured = 1;
-    verdict.witness.text = "tissue is alive, and there is no skin";
-  }
-  return verdict;
-}
-
 // A verdict of no row of the registry.
 Verdict of_file(std::string_view property, std::string_view source) {
   Verdict verdict;
@@ -302,6 +289,17 @@ bool ForeignVerdicts::holds() const {
   return std::all_of(verdicts.begin(), verdicts.end(), [](const Verdict& verdict) { return verdict.holds; });
 }
 
+Verdict closed_skin(const Skin& skin, bool any_alive) {
+  Verdict verdict = oracles::closed_surface(skin);
+  if (skin.triangles.empty() && any_alive) {
+    verdict.holds = false;
+    verdict.vacuous.clear();
+    verdict.measured = 1;
+    verdict.witness.text = "tissue is alive, and there is no skin";
+  }
+  return verdict;
+}
+
 ForeignVerdicts judge_foreign_state(const ForeignState& foreign) {
   ForeignVerdicts found;
   found.notes = foreign.notes;
@@ -309,6 +307,8 @@ ForeignVerdicts judge_foreign_state(const ForeignState& foreign) {
   lists.push_back(&oracles::lone_state_properties());
   const bool surface_alone = foreign.loose_skin.position.size() + foreign.loose_skin.triangles.size() > 0 ||
                              (foreign.given.contains("vertices") && !foreign.given.contains("vertex_owner"));
+  const auto& alive = foreign.state.alive;
+  const bool any_alive = std::find(alive.begin(), alive.end(), 1) != alive.end();
 
   std::vector<Verdict> due;
   if (foreign.defect.empty()) {
@@ -325,14 +325,14 @@ ForeignVerdicts judge_foreign_state(const ForeignState& foreign) {
       const bool is_form = property.name == due.front().property;
       if (why.empty() && !well_formed && !is_form) why = "the state is not well formed";
       if (why.empty() && surface_alone && property.name == "skin surface") {
-        found.verdicts.push_back(closed(foreign, true));
+        found.verdicts.push_back(closed_skin(foreign.loose_skin, any_alive));
         continue;
       }
       // Of vertices without owners nothing is known but where they are, which is all that such a promise is about.
       const bool is_free_match =
           property.name == "skin match" && foreign.promises.free_skin_places() && foreign.given.contains("vertices");
       if (is_free_match && well_formed) {
-        const Verdict surface = closed(foreign, surface_alone);
+        const Verdict surface = closed_skin(surface_alone ? foreign.loose_skin : foreign.state.skin, any_alive);
         if (surface.holds) {
           found.verdicts.push_back(oracles::free_skin_match(foreign.setup, foreign.state,
                                                             surface_alone ? foreign.loose_skin : foreign.state.skin));

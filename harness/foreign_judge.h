@@ -27,6 +27,9 @@ struct ForeignVerdicts {
   bool holds() const;
 };
 
+// "skin surface" of a skin whose vertices have no owners: closed, oriented, 2-manifold; and there, if any tissue is.
+Verdict closed_skin(const Skin& skin, bool any_alive);
+
 ForeignVerdicts judge_foreign_state(const ForeignState& foreign);
 
 }  // namespace cutproof::harness

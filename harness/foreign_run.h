@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "harness/foreign_judge.h"
+#include "harness/run_frames.h"
 #include "model/io/run_segments.h"
 #include "oracles/runs/run_judge.h"
 
@@ -26,6 +27,7 @@ struct JudgedRun {
 
 // Reads and judges one segment after the other; `frame_done` is called after each frame. Shapes, types and names are
 // the file's: where one is wrong an InputError says so. Values are the run's: where one is wrong it does not hold.
-JudgedRun judge_run(io::RunSegments& segments, const std::function<void(int64_t frame)>& frame_done = {});
+JudgedRun judge_run(io::RunSegments segments,
+                    const std::function<void(int64_t frame, const oracles::RunJudge&)>& frame_done = {});
 
 }  // namespace cutproof::harness

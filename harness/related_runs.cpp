@@ -23,18 +23,10 @@ using oracles::RunCoupling;
 // Times of one frame in two runs, relative: sums of steps round.
 constexpr double kSameTime = 1e-9;
 
-io::RunSegments open(const std::string& path) {
-  if (io::RunSegments::has_segments(path)) return io::RunSegments(path);
-  io::ArrayFile contents = io::read_array_file(path);
-  if (!io::RunSegments::is_segment(contents))
-    throw InputError(path, "positions", "This is no run.", "Write positions with the axes frame, particle and 3.");
-  return {path, std::move(contents)};
-}
-
 // One run where it is, with the coupling that holds.
 class OpenRun {
  public:
-  explicit OpenRun(const std::string& path) : path_(path), segments_(open(path)), frames_(segments_) {}
+  explicit OpenRun(const std::string& path) : path_(path), frames_(io::RunSegments::of(path)) {}
 
   bool next() {
     if (!frames_.next()) return false;
@@ -44,7 +36,7 @@ class OpenRun {
       coupling_ = std::move(*coupling);
       is_new_coupling_ = true;
     }
-    if (std::optional<std::vector<double>> mass = frames_.segment().mass()) mass_ = std::move(*mass);
+    if (std::vector<double> mass = frames_.segment().mass(); !mass.empty()) mass_ = std::move(mass);
     return true;
   }
   const std::string& path() const { return path_; }
@@ -55,7 +47,6 @@ class OpenRun {
 
  private:
   std::string path_;
-  io::RunSegments segments_;
   RunFrames frames_;
   std::optional<RunCoupling> coupling_;
   std::vector<double> mass_;

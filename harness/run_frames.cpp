@@ -102,6 +102,15 @@ RunSegment::RunSegment(io::ArrayFile contents, std::string file, int64_t frame)
   blade_ = quads();
   if (const Array* const parent = in_.find("parent", {particles_})) parent_ = in_.integers(*parent);
   if (const Array* const piece = in_.find("piece", {particles_})) piece_ = in_.integers(*piece);
+  if (const Array* const vertices = find("vertices", {-1, 3})) vertices_ = in_.vectors(*vertices);
+  has_vertices_ = in_.has("vertices");
+  if (const Array* const triangles = in_.find("triangles", {-1, 3})) {
+    if (!has_vertices_) in_.refuse("triangles", "There are no vertices.", "Write vertices of each frame.");
+    const std::vector<int32_t> corners = in_.integers(*triangles);
+    triangles_.emplace();
+    for (std::size_t k = 0; k < corners.size(); k += 3)
+      triangles_->push_back({corners[k], corners[k + 1], corners[k + 2]});
+  }
 }
 
 oracles::RunFrame RunSegment::frame(int64_t k) const {
@@ -227,9 +236,9 @@ std::optional<oracles::RunCoupling> RunSegment::coupling() const {
   return coupling;
 }
 
-std::optional<std::vector<double>> RunSegment::mass() const {
+std::vector<double> RunSegment::mass() const {
   const Array* const found = in_.find("mass", {particles_});
-  if (found == nullptr) return std::nullopt;
+  if (found == nullptr) return {};
   std::vector<double> masses = in_.numbers(*found);
   for (const double m : masses) {
     if (!(m > 0)) in_.refuse("mass", fmt::format("It holds {}.", m), "Write masses above 0, in kg.");
@@ -237,15 +246,35 @@ std::optional<std::vector<double>> RunSegment::mass() const {
   return masses;
 }
 
+std::span<const Vec3> RunSegment::vertices(int64_t k) const { return of_frame(vertices_, k); }
+
 bool RunFrames::next() {
-  if (segment_ && ++in_segment_ < segment_->frames()) return true;
-  begun_ += segment_ ? segment_->frames() : 0;
-  in_segment_ = 0;
-  segment_.reset();  // before the next one is read: two need not fit into memory
-  std::optional<io::ArrayFile> contents = segments_.next();
-  if (!contents) return false;
-  segment_ = std::make_unique<RunSegment>(std::move(*contents), segments_.source(), begun_);
+  if (!segment_ || ++in_segment_ == segment_->frames()) {
+    before_ += segment_ ? segment_->frames() : 0;
+    in_segment_ = 0;
+    segment_.reset();  // before the next one is read: two need not fit into memory
+    std::optional<io::ArrayFile> contents = segments_.next();
+    if (!contents) return false;
+    segment_ = std::make_unique<RunSegment>(std::move(*contents), segments_.source(), before_);
+    if (begun_++ == 0) {
+      header_ = segment_->header();
+      precision_ = segment_->precision();
+    }
+    if (segment_->triangles()) triangles_ = segment_->triangles();
+    if (segment_->has_vertices() && !triangles_)
+      segment_->arrays().refuse("vertices", "There are no triangles.", "Write triangles, too.");
+  }
+  frame_ = segment_->frame(in_segment_);
   return true;
+}
+
+std::optional<Skin> RunFrames::skin() const {
+  if (!segment_->has_vertices()) return std::nullopt;
+  Skin skin;
+  const std::span<const Vec3> places = segment_->vertices(in_segment_);
+  skin.position.assign(places.begin(), places.end());
+  skin.triangles = *triangles_;
+  return skin;
 }
 
 }  // namespace cutproof::harness

@@ -1,16 +1,19 @@
 // A run of somebody else's simulator, frame by frame, from named arrays (docs/reference/run.md).
 #pragma once
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "harness/named_arrays.h"
 #include "model/io/run_segments.h"
 #include "model/precision.h"
+#include "model/skin.h"
 #include "oracles/runs/run.h"
 
 namespace cutproof::harness {
@@ -23,6 +26,8 @@ const std::vector<KnownArray>& run_texts();
 // wrong an InputError says so. Values are the run's.
 class RunSegment {
  public:
+  using Triangles = std::vector<std::array<int32_t, 3>>;
+
   // `frame`: the number of its first frame in the run.
   RunSegment(io::ArrayFile contents, std::string file, int64_t frame);
   RunSegment(const RunSegment&) = delete;
@@ -36,7 +41,10 @@ class RunSegment {
   oracles::RunHeader header() const;  // what is given once: of the first segment
   // Nothing where this segment does not give them anew.
   std::optional<oracles::RunCoupling> coupling() const;
-  std::optional<std::vector<double>> mass() const;  // [n] [kg]
+  std::vector<double> mass() const;  // [n] [kg]
+  bool has_vertices() const { return has_vertices_; }
+  std::span<const Vec3> vertices(int64_t k) const;  // of the skin, k-th frame of the segment
+  const std::optional<Triangles>& triangles() const { return triangles_; }
 
   const io::ArrayFile& contents() const { return contents_; }
   const NamedArrays& arrays() const { return in_; }
@@ -62,24 +70,37 @@ class RunSegment {
   std::vector<double> time_, energy_;
   std::vector<uint8_t> alive_, held_, removed_;
   std::vector<int32_t> parent_, piece_;
+  bool has_vertices_ = false;
+  std::vector<Vec3> vertices_;
+  std::optional<Triangles> triangles_;
 };
 
-// The frames of a run in order, as they are read.
+// The frames of a run, one after the other, each with what came with it.
 class RunFrames {
  public:
-  explicit RunFrames(io::RunSegments& segments) : segments_(segments) {}
+  explicit RunFrames(io::RunSegments segments) : segments_(std::move(segments)) {}
 
-  // Goes to the next frame; false after the last one, and then there is no segment any more.
+  // To the first frame, then to the one after; false: there is none. All that the others give is valid until then.
   bool next();
-  // Of the frame where it is.
+  const oracles::RunFrame& frame() const { return frame_; }
   const RunSegment& segment() const { return *segment_; }
-  bool begins_segment() const { return in_segment_ == 0; }
-  oracles::RunFrame frame() const { return segment_->frame(in_segment_); }
+  bool begins_segment() const { return in_segment_ == 0; }  // the frame is the first of its segment
+  int64_t segments() const { return begun_; }               // begun so far
+  // Of the first segment, which alone gives them; valid after the last frame, too.
+  const oracles::RunHeader& header() const { return *header_; }
+  Precision precision() const { return precision_; }
+  // The skin of the frame; its vertices have no owners.
+  std::optional<Skin> skin() const;
+  bool has_new_triangles() const { return begins_segment() && segment_->triangles().has_value(); }
 
  private:
-  io::RunSegments& segments_;
+  io::RunSegments segments_;
   std::unique_ptr<RunSegment> segment_;
-  int64_t begun_ = 0, in_segment_ = 0;  // frames of the run before the segment; frame in it
+  oracles::RunFrame frame_;
+  std::optional<oracles::RunHeader> header_;
+  Precision precision_ = Precision::binary64;
+  std::optional<RunSegment::Triangles> triangles_;
+  int64_t before_ = 0, in_segment_ = 0, begun_ = 0;  // frames before the segment; the frame in it; segments
 };
 
 }  // namespace cutproof::harness

@@ -139,10 +139,7 @@ Verdict free_skin_match(const Setup& setup, const State& state, const Skin& skin
   const Partition& components = judged.components();
   verdict.checked = components.count;
   const bool owned = skin.owner.size() == skin.position.size();
-  Skin joined;
-  joined.triangles = skin.triangles;
-  joined.owner.assign(skin.position.size(), 0);
-  const Shells shells = shells_of(joined, skin.position);
+  const Shells shells = shells_of(skin, skin.position);
   std::vector<int32_t> first_owner(shells.volume.size(), -1);
   for (std::size_t v = 0; owned && v < skin.owner.size(); ++v) {
     const int32_t shell = shells.of_vertex[v], owner = skin.owner[v];

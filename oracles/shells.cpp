@@ -45,15 +45,15 @@ int32_t count_cavities(const Judged& judged) {
 }
 
 Shells shells_of(const Skin& skin, const std::vector<Vec3>& points) {
-  DisjointSets sets(static_cast<int64_t>(skin.owner.size()));
-  std::vector<uint8_t> used(skin.owner.size(), 0);
+  DisjointSets sets(static_cast<int64_t>(points.size()));
+  std::vector<uint8_t> used(points.size(), 0);
   for (const auto& t : skin.triangles) {
     sets.unite(t[0], t[1]);
     sets.unite(t[0], t[2]);
     for (const int32_t v : t) used[at(v)] = 1;
   }
   Shells shells;
-  shells.of_vertex.assign(skin.owner.size(), -1);
+  shells.of_vertex.assign(points.size(), -1);
   int32_t count = 0;
   for (std::size_t v = 0; v < used.size(); ++v) {
     if (used[v] == 0) continue;

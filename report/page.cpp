@@ -67,19 +67,21 @@ json frames_json(const std::vector<FrameEnd>& frames) {
   return columns;
 }
 
-std::string thinned_in_words(const Pictures& pictures, int32_t particles) {
+std::string thinned_in_words(const Pictures& pictures, int32_t particles, bool is_foreign) {
   std::string words;
   if (pictures.thinning.every_frame > 1) {
-    words += fmt::format(
-        "To keep this page small, it shows one frame in {}, at its end, and every stage of the frames "
-        "in which something fails. ",
-        pictures.thinning.every_frame);
+    words += fmt::format("To keep this page small, it shows one frame in {}, {} in which something fails. ",
+                         pictures.thinning.every_frame,
+                         is_foreign ? "and those" : "at its end, and every stage of the frames");
   }
   if (pictures.thinning.every_particle > 1) {
     words += fmt::format(
         "It shows {} of {} particles, among them all that a failing verdict names; the skin is whole, "
         "and takes its colours from particles nearby. ",
         pictures.particles, particles);
+  }
+  if (pictures.own.patches_left_out > 0) {
+    words += fmt::format("Of the blade's sweep {} patches are not drawn. ", pictures.own.patches_left_out);
   }
   return words;
 }
@@ -129,7 +131,11 @@ json data_json(const Source& source, const Results& results, const Pictures& pic
         {pictures.reach_high.x, pictures.reach_high.y, pictures.reach_high.z}}},
       {"loss", std::max(pictures.own.loss, pictures.beside.loss)},
       {"nowhere", std::max(pictures.own.nowhere, pictures.beside.nowhere)},
-      {"thinned", thinned_in_words(pictures, body.particle_count())}};
+      {"thinned", thinned_in_words(pictures, body.particle_count(), source.is_foreign())},
+      // A run of somebody else's has frames without stages; with or without pieces, which need tissue.
+      {"foreign", source.is_foreign()},
+      {"hasPieces", !source.is_foreign() || !results.pieces.empty()},
+      {"lastCut", results.last_cut}};
 }
 
 }  // namespace

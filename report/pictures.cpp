@@ -213,6 +213,27 @@ json blade_json(const Setup& setup, const Moment& moment) {
   return {point_json(pose->edge), point_json(pose->along), point_json(pose->back)};
 }
 
+// Patches of the blade's sweep that a page draws of one moment at most, and of all moments.
+constexpr std::size_t kMostPatches = 500, kPatchesOfPage = 20'000;
+
+// Of what the blade has swept since the moment before; what is too much is left out evenly.
+json swept_json(const std::vector<Vec3>& corners, std::size_t most, int64_t& left_out) {
+  std::vector<std::size_t> patches;
+  for (std::size_t k = 0; k + 4 <= corners.size(); k += 4) {
+    if (std::all_of(&corners[k], &corners[k] + 4, [](Vec3 x) { return is_finite(x); })) patches.push_back(k);
+  }
+  json list = json::array();
+  const std::size_t shown = std::min(patches.size(), most);
+  for (std::size_t n = 0; n < shown; ++n) {
+    for (std::size_t c = 0; c < 4; ++c) {
+      for (int axis = 0; axis < 3; ++axis)
+        list.push_back(static_cast<float>(corners[patches[n * patches.size() / shown] + c][axis]));
+    }
+  }
+  left_out += static_cast<int64_t>(patches.size() - shown);
+  return list;
+}
+
 json detail(const Setup& setup, const Moment& moment, const State& state, int32_t pieces, int64_t alive) {
   return {{"frame", moment.frame},
           {"stage", name_of(moment.stage)},
@@ -252,10 +273,14 @@ Survey survey_of(const Source& source) {
     const io::Snapshot snapshot = source.snapshot(i);
     const State& state = snapshot.state;
     const bool is_end = snapshot.stage == Stage::skin;
-    survey.moments.push_back({i, state.frame - (i > 0 && is_end ? 1 : 0), snapshot.stage, i == 0});
+    const bool is_start = i == 0 && !source.is_foreign();
+    survey.moments.push_back({i, state.frame - (!is_start && is_end ? 1 : 0), snapshot.stage, is_start});
     if (!is_end) continue;
-    if (i == 0 || state.alive != alive) {
-      alive = state.alive;
+    const bool is_new = i == 0 || state.alive != alive;
+    if (is_new) alive = state.alive;
+    if (source.is_foreign()) {
+      pieces = pieces_of(source.of_run(i).piece);
+    } else if (is_new) {
       pieces = pieces_of(source.setup.body, alive);
     }
     for (std::size_t p = 0; p < state.x.size(); ++p) {
@@ -263,7 +288,7 @@ Survey survey_of(const Source& source) {
     }
     const int64_t removed = std::ssize(state.removed) + std::ssize(state.debris);
     survey.frames.push_back(
-        {i == 0 ? -1 : state.frame - 1, std::count_if(alive.begin(), alive.end(), [](uint8_t a) { return a != 0; }),
+        {is_start ? -1 : state.frame - 1, std::count_if(alive.begin(), alive.end(), [](uint8_t a) { return a != 0; }),
          std::ssize(state.clusters.number), pieces.count, std::ssize(state.skin.triangles), removed});
   }
   return survey;
@@ -404,8 +429,10 @@ Chunks drawn(const Source& source, const Source* other, bool is_own, const std::
   Walk walk(source);
   std::optional<Walk> other_walk;
   if (other != nullptr) other_walk.emplace(*other);
-  Pieces pieces;
-  int64_t alive = 0;
+  Pieces pieces, pieces_before;
+  int64_t alive = 0, frame_before = -1;
+  const std::size_t most_patches =
+      std::clamp<std::size_t>(kPatchesOfPage / std::max<std::size_t>(moments.size(), 1), 8, kMostPatches);
   const auto close = [&] {
     const bool is_first = result.text.empty();
     static const std::vector<int32_t> kNone;
@@ -416,23 +443,37 @@ Chunks drawn(const Source& source, const Source* other, bool is_own, const std::
   for (std::size_t k = 0; k < moments.size(); ++k) {
     const Together& both = moments[k];
     const int64_t snapshot = is_own ? both.own : both.other;
+    // What lies between two moments that are shown counts to the later one. (Before the state: who reads a file goes
+    // on, and not back.)
+    FrameOfRun of_run;
+    std::vector<Vec3> swept;
+    if (source.is_foreign()) {
+      for (int64_t frame = frame_before + 1; frame <= snapshot; ++frame) {
+        of_run = source.of_run(frame);
+        swept.insert(swept.end(), of_run.swept.begin(), of_run.swept.end());
+      }
+      frame_before = snapshot;
+    }
     const State& state = walk.at_snapshot(snapshot);
     const bool is_new = chunk.is_empty();  // the first of a chunk says everything
     if (is_new) result.first_moment.push_back(k);
     Picture picture;
     if (is_new || state.x != before.x) picture.x = only(state.x, kept);
-    if (k == 0 || state.alive != before.alive) {
+    const bool is_other_alive = k == 0 || state.alive != before.alive;
+    if (is_other_alive) alive = std::count_if(state.alive.begin(), state.alive.end(), [](uint8_t a) { return a != 0; });
+    if (source.is_foreign()) {
+      pieces_before = std::exchange(pieces, pieces_of(of_run.piece));
+    } else if (is_other_alive) {
       pieces = pieces_of(body, state.alive);
-      alive = std::count_if(state.alive.begin(), state.alive.end(), [](uint8_t a) { return a != 0; });
     }
-    if (is_new || state.alive != before.alive) {
+    if (is_new || is_other_alive || (source.is_foreign() && pieces.of != pieces_before.of)) {
       picture.alive = only(state.alive, kept);
       picture.piece = only(pieces.of, kept);
     }
     if (is_new || state.clusters.offsets != before.clusters.offsets ||
-        state.clusters.members != before.clusters.members) {
+        state.clusters.members != before.clusters.members || (source.is_foreign() && is_other_alive)) {
       const Holders holders = holders_of(state.clusters, body.particle_count());
-      picture.cluster = only(holders.lowest, kept);
+      picture.cluster = only(source.is_foreign() ? coupled_of(state.clusters, state.alive) : holders.lowest, kept);
       picture.holders = only(holders.count, kept);
     }
     if (is_new || state.skin != before.skin) {
@@ -442,8 +483,13 @@ Chunks drawn(const Source& source, const Source* other, bool is_own, const std::
     }
     // A moment that only the other run has changed nothing here.
     const bool is_of_this = is_own ? both.is_own : both.is_other;
-    if (snapshot > 0 && is_of_this) picture.change = only(changes_between(walk.before(), state), kept);
+    if (snapshot > 0 && is_of_this && !source.is_foreign())
+      picture.change = only(changes_between(walk.before(), state), kept);
     json one = detail(source.setup, both.moment, state, pieces.count, alive);
+    if (source.is_foreign()) {
+      one["swept"] = swept_json(swept, most_patches, result.patches_left_out);
+      if (of_run.time) one["time"] = json_number(*of_run.time);
+    }
     if (other_walk && both.is_comparable) {
       const Apart apart = apart_of(state, other_walk->at_snapshot(is_own ? both.other : both.own), body.grid.spacing);
       picture.apart = only(apart.codes, kept);

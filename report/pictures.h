@@ -15,11 +15,22 @@
 
 namespace cutproof::report {
 
+// What a run of somebody else's simulator has in a frame that no state holds.
+struct FrameOfRun {
+  std::vector<int32_t> piece;  // [n] by the blade's sweep; any number below n for each, -1 of what is in none
+  std::vector<Vec3> swept;     // by the blade, on the way to this frame: quads of four corners [m]; NaN: none
+  std::optional<double> time;  // [s]
+};
+
 // Where snapshots come from: a recording, or a test. Snapshot 0 is the state as loaded.
 struct Source {
   const Setup& setup;
   int64_t count = 0;
   std::function<io::Snapshot(int64_t)> snapshot;
+  // Of a run of somebody else's simulator, whose snapshots are the ends of frames 0, 1, … and have clusters that are
+  // coupling groups; null: of our own.
+  std::function<FrameOfRun(int64_t)> of_run = nullptr;
+  bool is_foreign() const { return of_run != nullptr; }
 };
 
 // What is kept of particles and moments where all of it would be too much for a page.
@@ -64,6 +75,7 @@ struct Chunks {
   std::vector<std::size_t> first_moment;  // of each
   nlohmann::json details;                 // one for each moment: what the page's words need
   double loss = 0;                        // by how much a place may be off [h]
+  int64_t patches_left_out = 0;           // of the blade's sweep, which are not drawn
   int64_t nowhere = 0;  // greatest count of particles that one moment does not show: not finite, or far outside
   int64_t bytes = 0;
 };

@@ -1,7 +1,6 @@
 #include "report/pieces.h"
 
 #include <algorithm>
-#include <numeric>
 #include <span>
 #include <utility>
 
@@ -23,16 +22,18 @@ std::span<const int32_t> extent(const Clusters& clusters, std::size_t k) {
 }  // namespace
 
 Pieces pieces_of(const Body& body, const std::vector<uint8_t>& alive) {
-  const oracles::Partition components = oracles::graph_components(body, alive);
-  std::vector<int64_t> size(at(components.count), 0);
-  for (const int32_t label : components.label) {
-    if (label >= 0) ++size[at(label)];
+  return pieces_of(oracles::graph_components(body, alive).label);
+}
+
+Pieces pieces_of(const std::vector<int32_t>& label) {
+  std::vector<int64_t> size(label.size(), 0);
+  std::vector<int32_t> order, rank(label.size());  // labels, in the order of their lowest particles
+  for (const int32_t one : label) {
+    if (one >= 0 && size[at(one)]++ == 0) order.push_back(one);
   }
-  std::vector<int32_t> order(size.size()), rank(size.size());
-  std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [&](int32_t a, int32_t b) { return size[at(a)] > size[at(b)]; });
   for (std::size_t k = 0; k < order.size(); ++k) rank[at(order[k])] = static_cast<int32_t>(k);
-  Pieces pieces = {components.label, components.count};
+  Pieces pieces = {label, static_cast<int32_t>(order.size())};
   for (int32_t& piece : pieces.of) {
     if (piece >= 0) piece = rank[at(piece)];
   }
@@ -59,6 +60,30 @@ Holders holders_of(const Clusters& clusters, int32_t particles) {
     }
   }
   return holders;
+}
+
+std::vector<int32_t> coupled_of(const Clusters& clusters, const std::vector<uint8_t>& alive) {
+  const auto particles = static_cast<int32_t>(alive.size());
+  // Each leads to a lower one of its component, the lowest to itself.
+  std::vector<int32_t> lower(alive.size(), -1);
+  const auto lowest = [&](int32_t i) {
+    while (lower[at(i)] != i) i = lower[at(i)] = lower[at(lower[at(i)])];
+    return i;
+  };
+  for (std::size_t k = 0; k + 1 < clusters.offsets.size(); ++k) {
+    int32_t joined = -1;
+    for (const int32_t member : extent(clusters, k)) {
+      if (member < 0 || member >= particles || alive[at(member)] == 0) continue;
+      if (lower[at(member)] < 0) lower[at(member)] = member;
+      const int32_t other = lowest(member);
+      if (joined >= 0 && joined != other) lower[at(std::max(joined, other))] = std::min(joined, other);
+      joined = joined >= 0 ? std::min(joined, other) : other;
+    }
+  }
+  for (int32_t i = 0; i < particles; ++i) {
+    if (lower[at(i)] >= 0) lower[at(i)] = lowest(i);
+  }
+  return lower;
 }
 
 namespace {

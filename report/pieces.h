@@ -15,6 +15,8 @@ struct Pieces {
 };
 // Components of the alive particles along edges of the body. `alive`: [n].
 Pieces pieces_of(const Body& body, const std::vector<uint8_t>& alive);
+// The same of pieces that are known: `label`, [n], any number below n for each, -1 of what is in none.
+Pieces pieces_of(const std::vector<int32_t>& label);
 
 // Clusters of a state that may be as wrong as it likes: nothing is read that is not there.
 struct Holders {
@@ -24,6 +26,8 @@ struct Holders {
   std::vector<uint8_t> count;   // [n] how many clusters hold it, at most 255
 };
 Holders holders_of(const Clusters& clusters, int32_t particles);
+// Of each particle the lowest of those that clusters join it with, -1 of what is dead or in none. `alive`: [n].
+std::vector<int32_t> coupled_of(const Clusters& clusters, const std::vector<uint8_t>& alive);
 // Particles of the cluster of this number, none twice; empty if there is no such cluster.
 std::vector<int32_t> members_of(const Clusters& clusters, int32_t number, int32_t particles);
 

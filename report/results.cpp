@@ -103,11 +103,12 @@ void add_verdicts(const Field& document, Results& results) {
   std::vector<Row> rows;
   std::map<std::pair<std::string, Stage>, std::size_t> at;
   const Measured known = measured_properties(document);
+  const Measured* const of_summary = results.is_foreign() ? nullptr : &known;
   const auto add_list = [&](const Field& list, const Measured* measured) {
     const std::size_t count = list.length();
     for (std::size_t k = 0; k < count; ++k) add_verdict(list.at(k), measured, rows, at, results);
   };
-  if (results.checked) add_list(document["verdicts"], &known);
+  if (results.checked) add_list(document["verdicts"], of_summary);
   if (const Field against = document["against"]; against.value != nullptr) {
     results.checked = true;
     add_list(against["verdicts"], nullptr);
@@ -195,13 +196,35 @@ void add_series(const Field& document, Results& results) {
   }
 }
 
+// What was not judged stands among the rows of what was.
+Results foreign_results(const Field& document) {
+  Results results;
+  results.command = "check_run";
+  results.version = document["cutproof"].text();
+  results.scene = document["source"].text();
+  results.particles = document["run"]["particles_at_end"].count();
+  results.checked = true;
+  results.holds = document["summary"]["holds"].flag();
+  add_verdicts(document, results);
+  document["not_judged"].each([&](const Field& one) {
+    PropertyRow& row = results.rows.emplace_back();
+    row.property = one["property"].text();
+    row.vacuous = one["why"].text();
+  });
+  if (document["pieces"]["units"].count() > 0) results.pieces = document["pieces"]["in_words"].text();
+  results.last_cut = document["pieces"]["last_cut"].is_nothing() ? -1 : document["pieces"]["last_cut"].count();
+  results.notes = document["notes"].texts();
+  return results;
+}
+
 }  // namespace
 
 Results results_of(const json& given, const std::string& file) {
   const Field document = {&given, file, "", kRemedy};
   if (!given.is_object()) document.refuse("this is no result of cutproof");
-  Results results;
   const std::string format = document["format"].text();
+  if (format == "cutproof.check_run") return foreign_results(document);
+  Results results;
   if (format != "cutproof.run" && format != "cutproof.check")
     document["format"].refuse("'" + format + "' is no result of a run or of a check, of which alone a page is made");
   results.command = format.substr(format.find('.') + 1);
@@ -272,7 +295,8 @@ std::string count_in_words(const std::vector<PropertyRow>& rows) {
 std::string of_what_was_judged(const Results& results) {
   const std::string scene = results.scene.empty() ? "a scene without a name" : "scene " + results.scene;
   const std::string subject =
-      results.command == "run" ? fmt::format("cutproof ran {} on backend {}", scene, results.backend)
+      results.is_foreign()       ? "cutproof judged the run " + results.scene
+      : results.command == "run" ? fmt::format("cutproof ran {} on backend {}", scene, results.backend)
       : results.command == "check"
           ? fmt::format("cutproof judged a recording of {}, simulated by backend {}", scene, results.backend)
           : fmt::format("This is a recording of {}, simulated by backend {}", scene, results.backend);
@@ -287,14 +311,16 @@ std::string of_what_was_judged(const Results& results) {
     return sentence +
            fmt::format(", in {} {}.", io::grouped(results.verdicts), results.verdicts == 1 ? "verdict" : "verdicts");
   if (first == results.findings.end()) return sentence + ".";
-  return sentence + fmt::format("; '{}' fails{} in frame {} after {}.", first->property, failing > 1 ? " first," : "",
-                                first->frame, name_of(first->stage));
+  const std::string stage = results.is_foreign() ? "" : fmt::format(" after {}", name_of(first->stage));
+  return sentence + fmt::format("; '{}' fails{} in frame {}{}.", first->property, failing > 1 ? " first," : "",
+                                first->frame, stage);
 }
 
 }  // namespace
 
 std::string summary_sentence(const Results& results) {
-  const std::string sentence = of_what_was_judged(results);
+  std::string sentence = of_what_was_judged(results);
+  if (!results.pieces.empty()) sentence += " At its end: " + results.pieces + ".";
   return results.left_stages.empty() ? sentence : sentence + " " + left_in_words(results.left_stages);
 }
 

@@ -18,9 +18,9 @@ import numpy
 _ONCE = dict(rest="n3", permutation="n", mass="n", gravity="3", spacing="", steps="", damping="", edges="e2", cells="c4 c8",
              nodes="n3", cut_resolution="", unit_roundoff="")
 _BY_FRAME = dict(positions="n3", time="", velocities="n3", alive="n", held="n", removed="n", spin="n3",
-                 contact_impulse="3", energy="", blade="q43 q33")
-_BY_SEGMENT = dict(parent="n", piece="n", mass="n", cells="c4 c8", vertices="v3", triangles="t3", groups_offsets="g",
-                   groups_members="m", groups_weights="m")
+                 contact_impulse="3", energy="", blade="q43 q33", vertices="v3")
+_BY_SEGMENT = dict(parent="n", piece="n", mass="n", cells="c4 c8", triangles="t3", groups_offsets="g", groups_members="m",
+                   groups_weights="m")
 _WHOLE = {"edges", "cells", "nodes", "parent", "piece", "permutation", "triangles", "groups_offsets", "groups_members",
           "steps"}
 _FLAGS = {"alive", "held", "removed"}
@@ -109,7 +109,6 @@ class Writer:
             raise ValueError(f"positions: {n} particles; wanted are at least {self.n}, as in the frame before")
         made = _checked(_BY_FRAME | _BY_SEGMENT, n, arrays)
         frame = {name: made.pop(name) for name in _BY_FRAME if name in made}
-        skin = {name: made.pop(name) for name in ("vertices", "triangles") if name in made}
         if self.grid and groups is None:
             groups = grid_groups(positions, *self.grid, labels, frame.get("alive", True))
         made.update(_groups(groups, n) if groups is not None else {})
@@ -118,11 +117,11 @@ class Writer:
         forms = [{name: (value.dtype, value.shape) for name, value in of.items()} for of in [frame] + self.frames[-1:]]
         if self.frames and (made or forms[0] != forms[1]):
             self._write()
-        self.segment.update(made | skin)
+        self.segment.update(made)
         self.known.update(made)
         self.frames.append(frame)
         self.n = n
-        if not self.single and (skin or len(self.frames) >= self.flush):  # a skin is that of a segment's last frame
+        if not self.single and len(self.frames) >= self.flush:
             self._write()
 
     def _write(self, last=False):

@@ -877,7 +877,7 @@ std::vector<Verdict> judge_scene(const Question& question, const Arrays& answers
   harness::JudgedRun judged;
   try {
     io::RunSegments segments("the run", std::move(run.frames));
-    judged = harness::judge_run(segments);
+    judged = harness::judge_run(std::move(segments));
   } catch (const InputError& error) {
     return {unreadable(kAsAsked, error.what())};
   }

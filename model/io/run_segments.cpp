@@ -7,6 +7,7 @@
 
 #include "model/error.h"
 #include "model/io/array_parts.h"
+#include "model/io/recorded_segments.h"
 
 namespace cutproof::io {
 
@@ -61,6 +62,23 @@ bool RunSegments::is_segment(const ArrayFile& contents) {
   return positions != nullptr && positions->shape.size() == 3 && find_array(contents.arrays, "kicked") == nullptr;
 }
 
+RunSegments RunSegments::of(const std::string& path) {
+  if (has_segments(path)) return RunSegments(path);
+  if (!is_array_file(path)) return of_recording(path);
+  std::vector<ArrayFile> only;
+  only.push_back(read_array_file(path));
+  if (!is_segment(only.front()))
+    throw InputError(path, "positions", "This is no run.", "Write positions with the axes frame, particle and 3.");
+  return RunSegments(path, std::move(only));
+}
+
+RunSegments RunSegments::of_recording(const std::string& name) {
+  RunSegments segments;
+  segments.source_ = name;
+  segments.recorded_ = std::make_shared<RecordedSegments>(name);
+  return segments;
+}
+
 RunSegments::RunSegments(std::string path) : path_(std::move(path)), source_(path_) {
   std::error_code ignored;
   is_folder_ = std::filesystem::is_directory(path_, ignored);
@@ -71,6 +89,7 @@ RunSegments::RunSegments(std::string path) : path_(std::move(path)), source_(pat
 }
 
 std::optional<ArrayFile> RunSegments::next() {
+  if (recorded_) return recorded_->next();
   if (next_ < in_memory_.size()) return std::move(in_memory_[next_++]);
   if (next_ >= names_.size()) return std::nullopt;
   const std::string& name = names_[next_];

@@ -1,6 +1,7 @@
-// A run of somebody else's simulator in segments, each of which is a file of arrays by itself (docs/reference/run.md):
-// one NPZ; an HDF5 file with a group for each; or a folder with an NPZ for each.
+// A run of any simulator in segments, each of which is a file of arrays by itself (docs/reference/run.md): one NPZ; an
+// HDF5 file with a group for each; a folder with an NPZ for each; or a recording.
 #pragma once
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -10,6 +11,8 @@
 
 namespace cutproof::io {
 
+class RecordedSegments;
+
 class RunSegments {
  public:
   // Whether this is a folder, or an HDF5 file with the group 000000.
@@ -17,11 +20,16 @@ class RunSegments {
   // Whether a file of arrays is a run by itself: `positions` have three axes, and it is no kick.
   static bool is_segment(const ArrayFile& contents);
 
+  // Of any kind. Throws what read_array_file and RecordingReader throw, and InputError if there is no segment.
+  static RunSegments of(const std::string& path);
   // Requires has_segments(path). Throws InputError if there is no segment.
   explicit RunSegments(std::string path);
   // Those that are in memory; `source`: what errors name.
   RunSegments(std::string source, std::vector<ArrayFile> segments)
       : source_(std::move(source)), in_memory_(std::move(segments)) {}
+
+  // Of a recording.
+  static RunSegments of_recording(const std::string& name);
 
   // The next one, or nothing after the last; the first with what is given once per run. Throws what read_array_file
   // throws.
@@ -30,10 +38,12 @@ class RunSegments {
   const std::string& source() const { return source_; }
 
  private:
+  RunSegments() = default;
   std::string path_, source_;
   bool is_folder_ = false;
   std::vector<std::string> names_;
   std::vector<ArrayFile> in_memory_;  // without names
+  std::shared_ptr<RecordedSegments> recorded_;
   std::size_t next_ = 0;
 };
 

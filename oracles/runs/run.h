@@ -17,10 +17,12 @@ enum class RunPromise : uint8_t {
   free,              // nothing outside pushes, but gravity and what `contact_impulse` says
   angular_momentum,  // kept while nothing pushes
   energy,            // `energy` never grows while nothing pushes
+  skin,              // the skin goes around each piece by itself
   deterministic,     // a second run has the same bits, which one run does not show
 };
 // Their words, in that order.
-inline constexpr std::array<std::string_view, 4> kRunPromises = {"free", "angular_momentum", "energy", "deterministic"};
+inline constexpr std::array<std::string_view, 5> kRunPromises = {"free", "angular_momentum", "energy", "skin",
+                                                                 "deterministic"};
 
 // Lists are empty where they are not given. Particles are numbered from 0; n is their number in the first frame.
 struct RunHeader {

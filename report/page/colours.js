@@ -66,8 +66,8 @@ function stretches(xyz, alive, edges) {
 const decade = (code) => code / 4 - 12;
 
 // Each: what it is called, and of a picture the colour of each particle and a legend: words, a scale or keys.
-// `comparison`: with another run, or null.
-export function colourings(hasStretch, comparison) {
+// `comparison`: with another run, or null. foreign: of somebody else's run, whose clusters are coupling groups.
+export function colourings(hasStretch, comparison, { foreign, hasPieces } = { hasPieces: true }) {
   let farthest = 1e-9;  // so far, so that colours mean the same from frame to frame
   let least = 250, most = 1;
   const all = {
@@ -85,12 +85,12 @@ export function colourings(hasStretch, comparison) {
       },
     },
     cluster: {
-      name: 'cluster',
+      name: foreign ? 'what is coupled' : 'cluster',
       of({ moment, edges, first }) {
         const chosen = choices(moment, edges, first && first !== moment ? choices(first, edges, null) : null);
         return {
           colour: (i) => (moment.cluster[i] < 0 ? kGrey : clusterColours[chosen[moment.cluster[i]]]),
-          words: `Each particle has the colour of the first cluster that holds it${edges ? '; where two such meet, or no more than two layers of removed particles lie between them, their colours differ' : ''}.`,
+          words: foreign ? 'Particles of one colour are coupled with each other, by one group or a chain of them; grey: in no group.' : `Each particle has the colour of the first cluster that holds it${edges ? '; where two such meet, or no more than two layers of removed particles lie between them, their colours differ' : ''}.`,
         };
       },
     },
@@ -150,15 +150,17 @@ export function colourings(hasStretch, comparison) {
       },
     },
     holders: {
-      name: 'number of clusters',
+      name: foreign ? 'number of coupling groups' : 'number of clusters',
       of({ moment }) {
         let greatest = 1;
         for (const holders of moment.holders) if (holders > greatest) greatest = holders;
-        return { colour: (i) => onRamp(moment.holders[i] / greatest), words: 'How many clusters hold each particle.', scale: ['0', String(greatest)] };
+        return { colour: (i) => onRamp(moment.holders[i] / greatest), words: `How many ${foreign ? 'coupling groups' : 'clusters'} hold each particle.`, scale: ['0', String(greatest)] };
       },
     },
   };
   if (!hasStretch) delete all.stretch;
+  if (!hasPieces) delete all.piece;
+  if (foreign) delete all.change;
   if (!comparison) delete all.apart;
   return all;
 }

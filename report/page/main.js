@@ -21,7 +21,8 @@ const kFramesPerSecond = 15;
 const state = { at: 0, finding: null, isPlaying: false, spot: null };
 let view = null, edges = null, plots = [], shown = 0, colours = null;
 
-const words = (moment) => (moment.start ? 'As loaded' : `Frame ${moment.frame}, after ${moment.stage}`);
+// Frames of somebody else's run have no stages.
+const words = (moment) => (moment.start ? 'As loaded' : data.foreign ? `Frame ${moment.frame}` : `Frame ${moment.frame}, after ${moment.stage}`);
 
 function header() {
   const name = data.scene || 'a recording';
@@ -29,7 +30,7 @@ function header() {
   byId('title').textContent = name;
   const kind = !data.checked ? 'muted' : data.holds ? 'good' : 'bad';
   byId('summary').append(element('span', { class: `badge ${kind}`, text: !data.checked ? 'not judged' : data.holds ? '✓ holds' : '✕ fails' }), element('span', { text: data.summary }));
-  const facts = [`${plural(data.body.particles, 'particle')}`, `h = ${figure(1e3 * data.body.spacing)} mm`, `${plural(data.frames.frame.length - 1, 'frame')}`];
+  const facts = [`${plural(data.body.particles, 'particle')}`, `h = ${figure(1e3 * data.body.spacing)} mm`, `${plural(data.frames.frame.filter((frame) => frame >= 0).length, 'frame')}`];
   if (data.checked) facts.push(plural(data.verdicts, 'verdict'));
   facts.push(`cutproof ${data.judgedBy || data.program}`);
   byId('facts').textContent = facts.join(' · ');
@@ -63,6 +64,10 @@ function timeline() {
   if (data.findings.some((f) => !f.expected)) keys.push(['bad', 'a verdict fails']);
   if (data.findings.some((f) => f.expected)) keys.push(['warn', 'fails as expected']);
   if (data.moments.some((m) => m.removed > 0)) keys.push(['cut', 'particles are removed']);
+  if (data.foreign) {
+    data.moments.forEach((moment, k) => { if (moment.swept.length && !(moment.removed > 0)) mark(k, 'cut', 9, 5); });
+    if (data.moments.some((m) => m.swept.length)) keys.push(['cut', 'the blade is in the tissue']);
+  }
   const legendOfIt = element('ul', { class: 'legend' }, ...keys.map(([kind, text]) => element('li', {}, element('span', { class: `key ${kind}` }), element('span', { text }))));
   return [svg, legendOfIt];
 }
@@ -76,19 +81,20 @@ function controls() {
   const [marks, keys] = timeline();
   return element('div', { class: 'player' },
     element('div', { class: 'track' }, marks, range),
-    element('div', { class: 'row' }, play, button('« Frame', 'Previous frame', frame(-1)), button('‹ Stage', 'Previous stage', step(-1)), button('Stage ›', 'Next stage', step(1)), button('Frame »', 'Next frame', frame(1)), keys));
+    element('div', { class: 'row' }, play, button('« Frame', 'Previous frame', frame(-1)), !data.foreign && button('‹ Stage', 'Previous stage', step(-1)), !data.foreign && button('Stage ›', 'Next stage', step(1)), button('Frame »', 'Next frame', frame(1)), keys));
 }
 
 function lookControls(hasSkin) {
-  const all = colourings(Boolean(edges) && data.body.onGrid, comparison);
+  const all = colourings(Boolean(edges) && data.body.onGrid, comparison, data);
   colours = all;
-  look.colouring = all.piece;
-  look.skin = hasSkin;
-  look.particles = !hasSkin;
+  look.colouring = all.piece || all.cluster;
+  // The skin of somebody else's run says nothing of particles.
+  look.skin = hasSkin && !data.foreign;
+  look.particles = !look.skin;
   const select = (label, id, options, onchange) => element('label', {}, element('span', { text: label }), element('select', { id, onchange: (event) => { onchange(event.target.value); update(); } }, ...options.map(([value, text]) => element('option', { value, text }))));
   const shows = [['skin', 'skin'], ['particles', 'particles'], ['both', 'both']];
   return element('div', { class: 'row looks' },
-    hasSkin && select('Show', 'show', shows, (value) => { look.skin = value !== 'particles'; look.particles = value !== 'skin'; }),
+    hasSkin && select('Show', 'show', data.foreign ? [shows[1], shows[0], shows[2]] : shows, (value) => { look.skin = value !== 'particles'; look.particles = value !== 'skin'; }),
     select('Colour', 'colour', Object.entries(all).map(([key, one]) => [key, one.name]), (value) => { look.colouring = all[value]; }),
     element('label', {}, element('input', { type: 'checkbox', id: 'removed', onchange: (event) => { look.removed = event.target.checked; update(); } }), element('span', { text: 'removed' })),
     ...view.plane.controls(view.orbit),
@@ -154,7 +160,9 @@ async function update() {
   const found = state.finding === null ? null : data.findings[state.finding];
   range.value = state.at;
   range.setAttribute('aria-valuetext', words(moment));
-  const facts = [plural(moment.components, 'piece'), plural(moment.clusters, 'cluster'), plural(moment.particles, 'particle')];
+  const facts = [data.hasPieces && plural(moment.components, 'piece'), plural(moment.clusters, data.foreign ? 'coupling group' : 'cluster'), plural(moment.particles, 'particle')].filter(Boolean);
+  if (moment.time !== undefined) facts.unshift(`${figure(moment.time)} s`);
+  if (data.foreign && moment.swept.length) facts.push('the blade is in the tissue');
   if (moment.removed > 0) facts.push(`${count(moment.removed)} removed in this frame`);
   if (data.blade) facts.push(moment.blade ? 'blade down' : 'blade up');
   const apart = apartInWords(comparison, moment);
@@ -172,6 +180,7 @@ async function update() {
   const marks = found && marksOf(found);
   const said = view.show(arrays, abouts, look, marks || spot);
   const legends = [element('span', { text: said.words })];
+  if (said.blade) legends.push(element('span', { id: 'blade-words', text: ` ${said.blade}` }));
   if (said.scale) {
     const ramp = drawing('svg', { class: 'ramp', viewBox: '0 0 70 10', 'aria-hidden': 'true' }, ...rampStops.map((fill, k) => drawing('rect', { x: 10 * k, y: 0, width: 10.5, height: 10, fill })));
     legends.push(element('span', { text: ` ${said.scale[0]} ` }), ramp, element('span', { text: ` ${said.scale[1]}.` }));
@@ -246,7 +255,7 @@ function findings() {
   if (!data.checked) section.append(element('p', { text: 'This page shows what happened. Whether it is right, this command judges:' }));
   if (data.checked && data.holds && !failing.length) {
     const near = data.rows.filter((row) => row.judged > 0 && row.ofBound !== null).sort((a, b) => b.ofBound - a.ofBound)[0];
-    section.append(element('p', { text: `All that was judged holds${data.findings.length ? ', but for what the scene expects to fail' : ''}.${near ? ` The nearest to its bound is ${near.property} after ${near.stage}, at ${figure(near.ofBound)} of it, in frame ${near.frame}.` : ''}` }));
+    section.append(element('p', { text: `All that was judged holds${data.findings.length ? ', but for what the scene expects to fail' : ''}.${near ? ` The nearest to its bound is ${near.property}${data.foreign ? '' : ` after ${near.stage}`}, at ${figure(near.ofBound)} of it, in frame ${near.frame}.` : ''}` }));
   }
   section.append(...cards(data, showFinding));
   if (data.findingsLeftOut > 0) section.append(element('p', { class: 'muted', text: `${plural(data.findingsLeftOut, 'later failure')} of the same properties are counted in the table, and not shown.` }));
@@ -261,8 +270,9 @@ function about() {
   say(`Positions on this page are rounded to steps of 16 bits, and so off by at most ${figure(data.loss)} h (h is the spacing of particles). Verdicts were made from the full numbers.`);
   if (data.thinned) say(data.thinned);
   if (data.nowhere > 0) say(`Up to ${plural(data.nowhere, 'particle')} of a moment are not drawn: their positions are no numbers, or far outside the body.`);
-  say(`Frames count from 0. A frame is step, detect, split, merge, expand and skin; a stage that had nothing to do is left out. This page holds ${plural(data.moments.length, 'moment')}. It needs no network. Keys in the 3D view: arrows turn, with Shift they shift; + and − zoom, 0 shows the whole body; space plays, comma and full stop go a stage back and on; C cuts the body open, [ and ] move the cut and Alt with arrows turns it, as dragging with Alt and with Alt and Shift does.`);
-  if (!comparison) say('A distance to the reference is shown where one was asked for: cutproof run --against reference --report, or cutproof report with a second recording.');
+  const stages = data.foreign ? '' : ' A frame is step, detect, split, merge, expand and skin; a stage that had nothing to do is left out.';
+  say(`Frames count from 0.${stages} This page holds ${plural(data.moments.length, 'moment')}. It needs no network. Keys in the 3D view: arrows turn, with Shift they shift; + and − zoom, 0 shows the whole body; space plays, comma and full stop go a ${data.foreign ? 'frame' : 'stage'} back and on; C cuts the body open, [ and ] move the cut and Alt with arrows turns it, as dragging with Alt and with Alt and Shift does.`);
+  if (!comparison && !data.foreign) say('A distance to the reference is shown where one was asked for: cutproof run --against reference --report, or cutproof report with a second recording.');
 }
 
 async function main() {
@@ -301,7 +311,10 @@ async function main() {
     event.preventDefault();
     keys[event.key]();
   });
-  await go(0);
+  // Somebody else's run opens where it first fails, or where the blade has parted tissue last.
+  if (!data.foreign) await go(0);
+  else if (data.findings.length) await showFinding(0);
+  else await go(data.lastCut < 0 ? 0 : momentOf(data.lastCut, 'skin'));
   document.documentElement.dataset.ready = 'true';
 }
 

@@ -5,6 +5,7 @@ export class Orbit {
     this.changed = changed;
     this.home = { target: [0, 0, 0], distance: 10, around: -1.05, above: 0.42 };
     this.at = { ...this.home, target: [0, 0, 0] };
+    this.middle = [0, 0, 0];  // of what is looked at
     const pointers = new Map();
     let apart = 0;
     element.addEventListener('pointerdown', (event) => {
@@ -75,6 +76,14 @@ export class Orbit {
     const right = [-Math.sin(around), Math.cos(around), 0];
     const up = [-Math.sin(above) * Math.cos(around), -Math.sin(above) * Math.sin(around), Math.cos(above)];
     for (let k = 0; k < 3; ++k) target[k] += size * (-dx * right[k] + dy * up[k]);
+    this.place();
+  }
+
+  // Goes along with a body whose middle is there now.
+  follow(middle) {
+    for (const one of [this.at, this.home]) one.target = one.target.map((x, k) => x + middle[k] - this.middle[k]);
+    this.flight = null;
+    this.middle = middle;
     this.place();
   }
 

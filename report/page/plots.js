@@ -120,8 +120,9 @@ export function plotsOf(data, jump) {
     ? `${count(first(column))} ${what} throughout.` : `From ${count(first(column))} to ${count(last(column))}, at most ${count(greatest(column))}.`);
   if (ends.frame.length > 1) {
     const lines = (title, column, unit, words) => found.push(plot({ title, words, unit, frames: ends.frame, series: [{ name: unit, values: ends[column] }], kind: 'lines', whole: true, jump }));
-    lines('Pieces of tissue', 'components', 'pieces', changes('components', first('components') === 1 ? 'piece' : 'pieces'));
-    lines('Clusters', 'clusters', 'clusters', changes('clusters', 'clusters'));
+    if (data.hasPieces) lines('Pieces of tissue', 'components', 'pieces', changes('components', first('components') === 1 ? 'piece' : 'pieces'));
+    const groups = data.foreign ? 'coupling groups' : 'clusters';
+    lines(data.foreign ? 'Coupling groups' : 'Clusters', 'clusters', groups, changes('clusters', groups));
     if (greatest('removed') > 0) {
       const all = ends.removed.reduce((a, b) => a + b, 0);
       lines('Particles removed', 'removed', 'particles', `${count(all)} of ${count(data.body.particles)} in all.`);

@@ -130,6 +130,7 @@ export class Tissue {
     this.lines = [[5.5, 0xffffff], [2.5, 0x111111]].map(([size, color], k) => add(new Points(joined, new PointsMaterial({ size, color, sizeAttenuation: false, depthTest: false, transparent: true })), 5 + k));
     this.marks = add(new Points(new BufferGeometry(), new ShaderMaterial(pointShader(true, nowhere))), 4);
     if (data.blade) this.makeBlade();
+    if (data.foreign) this.makeSwept(add);
   }
 
   makeBlade() {
@@ -148,6 +149,35 @@ export class Tissue {
     plate.renderOrder = 1;
     this.blade.add(plate, new LineSegments(new EdgesGeometry(box), new LineBasicMaterial({ color: 0x5a6b7b })));
     this.blade.matrixAutoUpdate = false;
+  }
+
+  // What the blade has swept, as patches with rims.
+  makeSwept(add) {
+    this.swept = add(new Mesh(new BufferGeometry(), new ShaderMaterial(surfaceShader({ value: { x: 0, y: 0, z: 0, w: 1e9 } }, true))), 1);
+    this.swept.material.depthWrite = this.swept.material.depthTest = false;
+    this.sweptRims = add(new LineSegments(new BufferGeometry(), new LineBasicMaterial({ color: 0x5a6b7b, depthTest: false })), 1.5);
+  }
+
+  // patches: of each four corners, three numbers each [m]. Returns the legend.
+  showSwept(patches, isFaded, centre, spacing) {
+    const corners = Float32Array.from(patches, (x, k) => (x - centre[k % 3]) / spacing);
+    const faces = [], rims = [];
+    for (let first = 0; first < corners.length / 3; first += 4) {
+      for (const c of [0, 1, 2, 0, 2, 3]) faces.push(first + c);
+      for (const c of [0, 1, 1, 2, 2, 3, 3, 0]) rims.push(first + c);
+    }
+    const tint = new Uint8Array((4 * corners.length) / 3);
+    for (let i = 0; i < tint.length; i += 4) tint.set([184, 204, 224, 255], i);
+    write(this.swept.geometry, 'position', corners, 3);
+    write(this.swept.geometry, 'tint', tint, 4, true);
+    write(this.swept.geometry, 'index', new Uint32Array(faces), 1);
+    this.swept.geometry.setDrawRange(0, faces.length);
+    write(this.sweptRims.geometry, 'position', corners, 3);
+    write(this.sweptRims.geometry, 'index', new Uint32Array(rims), 1);
+    this.sweptRims.geometry.setDrawRange(0, rims.length);
+    this.swept.material.uniforms.fade.value = isFaded ? kBladeBesideMarks : kBlade;
+    this.swept.visible = this.sweptRims.visible = faces.length > 0;
+    return faces.length ? 'Steel: what the blade has swept on the way to this frame.' : '';
   }
 
   static scale(material, moment, centre, spacing) {
@@ -209,8 +239,9 @@ export class Tissue {
       this.steel.uniforms.fade.value = marks ? kBladeBesideMarks : kBlade;
       this.steel.depthTest = !marks && !hasParticles;
     }
+    const blade = this.swept ? this.showSwept(about.swept, Boolean(marks), centre, spacing) : '';
     this.showMarks(moment, marks, isRing, placesOfIt, centre, spacing);
-    return { words, scale, keys };
+    return { words, scale, keys, blade };
   }
 
   // Which particles nobody can see, wherever they look from: all six neighbours are there and near, and theirs as well,

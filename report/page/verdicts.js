@@ -30,10 +30,10 @@ function bar(row, fails) {
   return element('span', { class: 'measure' }, element('span', { class: 'bar', 'aria-hidden': 'true' }, filled, limit), element('span', { class: 'share', text }));
 }
 
-function statusOf(row) {
+function statusOf(row, data) {
   if (row.failed > 0) return ['bad', '✕ fails'];
   if (row.expected > 0) return ['warn', '! fails, as expected'];
-  if (row.judged === 0) return ['muted', '– nothing to look at'];
+  if (row.judged === 0) return ['muted', data.foreign ? '– not judged' : '– nothing to look at'];
   if (row.undecided > 0) return ['good', '✓ holds, some within rounding'];
   return ['good', '✓ holds'];
 }
@@ -41,20 +41,21 @@ function statusOf(row) {
 export function table(data, jump) {
   const body = element('tbody');
   for (const row of data.rows) {
-    const [kind, words] = statusOf(row);
+    const [kind, words] = statusOf(row, data);
     const fails = row.failed + row.expected > 0;
     const details = [];
-    if (row.failed > 0) details.push(`${count(row.failed)} of ${plural(row.judged, 'verdict')} fail`);
+    if (row.failed > 0 && data.foreign) details.push('its first failure is shown');
+    else if (row.failed > 0) details.push(`${count(row.failed)} of ${plural(row.judged, 'verdict')} fail`);
     else if (row.expected > 0) details.push(`${count(row.expected)} of ${plural(row.judged, 'verdict')} fail, which the scene expects`);
-    else if (row.judged > 0) details.push(plural(row.judged, 'verdict'));
+    else if (row.judged > 0) details.push(data.foreign ? `${count(row.checked)} looked at` : plural(row.judged, 'verdict'));
     else details.push(row.vacuous || 'there was nothing to look at');
     if (row.undecided > 0) details.push(`${plural(row.undecided, 'thing')} undecidable within rounding, counted as right`);
     body.append(element('tr', { class: fails ? kind : null },
-      element('th', { scope: 'row' }, element('span', { text: row.property }), element('span', { class: 'muted small', text: ` after ${row.stage}` })),
+      element('th', { scope: 'row' }, element('span', { text: row.property }), !data.foreign && element('span', { class: 'muted small', text: ` after ${row.stage}` })),
       element('td', {}, element('span', { class: `status ${kind}`, text: words }), element("span", { class: "muted small block", text: details.join('; ') })),
       element('td', {}, row.judged > 0 && bar(row, fails)),
       element('td', { class: 'figures' }, row.judged > 0 && element('span', { text: withUnit(row.measured, row.unit) }), row.judged > 0 && element('span', { class: 'muted small block', text: `bound ${withUnit(row.bound, row.unit)}` })),
-      element('td', {}, row.judged > 0 && element('button', { type: 'button', class: 'quiet', text: `frame ${row.frame}`, 'aria-label': `Show frame ${row.frame}, after ${row.stage}: ${fails ? 'where' : 'the nearest to the bound of'} ${row.property}${fails ? ' fails first' : ''}`, onclick: () => jump(row.frame, row.stage) })),
+      element('td', {}, row.judged > 0 && element('button', { type: 'button', class: 'quiet', text: `frame ${row.frame}`, 'aria-label': `Show frame ${row.frame}${data.foreign ? '' : `, after ${row.stage}`}: ${fails ? 'where' : 'the nearest to the bound of'} ${row.property}${fails ? ' fails first' : ''}`, onclick: () => jump(row.frame, row.stage) })),
       element('td', { class: 'muted small', text: sourceInWords(row.source) })));
   }
   const head = ['Property', 'Result', 'Measured / bound', 'Measured', fails(data) ? 'First failure, or nearest to the bound' : 'Nearest to the bound', 'Where the bound comes from'];
@@ -80,7 +81,7 @@ export function cards(data, show) {
     const text = element('p', { class: 'witness', text: first.text || 'It has no witness.' });
     const marks = first.marks.particles.length + first.marks.path.length + first.marks.members.length > 0;
     found.push(element('article', { class: `card ${first.expected ? 'warn' : 'bad'}` },
-      element('h3', {}, element('span', { text: first.property }), element('span', { class: 'muted', text: ` after ${first.stage}` })),
+      element('h3', {}, element('span', { text: first.property }), !data.foreign && element('span', { class: 'muted', text: ` after ${first.stage}` })),
       text,
       element('p', { class: 'muted small' }, first.measured !== 'nothing' && element('span', { text: `Measured ${withUnit(first.measured, first.unit)}, bound ${withUnit(first.bound, first.unit)} (${sourceInWords(first.source)}). ` }),
         element('span', { text: row && row.failed + row.expected > 1 ? `It fails in ${count(row.failed + row.expected)} of ${plural(row.judged, 'verdict')}.` : '' }),

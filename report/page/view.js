@@ -1,6 +1,6 @@
 // The 3D view: one run, or two beside each other, seen by one camera. Lengths are in h, the middle of the body is 0.
 import { Color, PerspectiveCamera, Scene, WebGLRenderer } from 'three';
-import { places } from './coding.js';
+import { kNowhere, kStride, places, scaleOf } from './coding.js';
 import { CutPlane } from './cut_plane.js';
 import { Orbit } from './orbit.js';
 import { Tissue } from './tissue.js';
@@ -71,7 +71,7 @@ export class View {
     this.plane.begin(this.radius);
     for (const { body } of this.sides) body.add(this.plane.outline.clone());
     this.resize();
-    this.orbit.at = { ...this.orbit.home, target: [0, 0, 0] };
+    this.orbit.at = { ...this.orbit.home, target: [...this.orbit.home.target] };
     this.orbit.place();
   }
 
@@ -99,8 +99,9 @@ export class View {
     for (let i = 0; i < this.start.length; i += every) {
       if (!Number.isNaN(this.start[i])) add(this.start.subarray(i, i + 3));
     }
-    // With room for the blade; and for what moves, unless the body would become small for it.
+    // With room for the blade; and for what moves, unless the body would become small for it, or the view goes along.
     const begins = 1.12 * most;
+    if (this.data.foreign) return begins;
     const spacing = this.data.body.spacing || 1;
     for (let corner = 0; corner < 8; ++corner) {
       add([0, 1, 2].map((k) => (this.data.reach[(corner >> k) & 1][k] - this.centre[k]) / spacing));
@@ -222,9 +223,23 @@ export class View {
   show(moments, abouts, look, marks) {
     const about = { centre: this.centre, start: this.start, edges: this.edges, first: this.first };
     const seen = { ...look, isCut: this.plane.isOn };
+    if (this.data.foreign) this.orbit.follow(this.middleOf(moments[0]));
     const legends = this.sides.map((side, k) => side.show(moments[k], abouts[k], seen, k === 0 ? marks : null, about));
     this.draw();
     return legends[0];
+  }
+
+  // Of what is there in a moment; where that is nothing, as before.
+  middleOf(moment) {
+    const { low, step } = scaleOf(moment, this.centre, this.data.body.spacing || 1);
+    const sum = [0, 0, 0];
+    let n = 0;
+    for (let i = 0; i < moment.alive.length; ++i) {
+      if (!moment.alive[i] || moment.x[kStride * i] === kNowhere) continue;
+      for (let k = 0; k < 3; ++k) sum[k] += moment.x[kStride * i + k];
+      ++n;
+    }
+    return n ? sum.map((x, k) => low[k] + (step[k] * x) / n) : this.orbit.middle;
   }
 
   // Flies to what is marked, if anything is; or to where another view has flown.
@@ -255,7 +270,7 @@ export class View {
     const nearest = this.radius * (isTriangle ? (isSmall ? 0.6 : 0.3) : isSmall ? 0.8 : 0.5);
     const seen = Math.min(this.radius, Math.max(1.8 * radius + 2, nearest));
     // Marks at the rim would leave half of the view empty.
-    const target = middle.map((x) => (1 - (isSmall ? kTowardsMiddleOfSmall : kTowardsMiddle)) * x);
+    const target = middle.map((x, k) => x + (isSmall ? kTowardsMiddleOfSmall : kTowardsMiddle) * (this.orbit.middle[k] - x));
     return [target, this.distanceFor(seen), isTriangle ? this.anglesFacing(this.sides[0].facing) : undefined];
   }
 

@@ -351,9 +351,19 @@ class WriterTest(unittest.TestCase):
             run.frame(np.zeros((3, 3)), parent=[-1, -1, 0], vertices=np.zeros((1, 3)), triangles=[[0, 0, 0]])
             run.frame(np.zeros((3, 3)))
         parts = segments(self.path("a.h5"))[1]
-        self.assertEqual([part["positions"].shape for part in parts], [(2, 2, 3), (1, 2, 3), (2, 3, 3), (1, 3, 3)])
-        self.assertEqual(["groups_members" in part for part in parts], [True, True, False, False])
-        self.assertEqual(["vertices" in part for part in parts], [False, False, True, False])
+        self.assertEqual([part["positions"].shape for part in parts], [(2, 2, 3), (1, 2, 3)] + 3 * [(1, 3, 3)])
+        self.assertEqual(["groups_members" in part for part in parts], [True, True, False, False, False])
+        self.assertEqual(["vertices" in part for part in parts], [False, False, False, True, False])
+
+    def test_a_skin_moves_within_a_segment_and_new_triangles_begin_one(self):
+        with cutproof_run.Writer(self.path("a.h5")) as run:
+            for frame in range(5):
+                run.frame(np.zeros((2, 3)), vertices=np.full((4, 3), float(frame)),
+                          triangles=[[0, 1, 2]] if frame < 3 else [[0, 1, 2], [1, 2, 3]])
+        parts = segments(self.path("a.h5"))[1]
+        self.assertEqual([part["vertices"].shape for part in parts], [(3, 4, 3), (2, 4, 3)])
+        self.assertEqual([part["triangles"].shape for part in parts], [(1, 3), (2, 3)])
+        self.assertEqual(list(parts[0]["vertices"][:, 0, 0]), [0, 1, 2])
 
     def test_one_npz_refuses_a_second_segment_and_keeps_the_first(self):
         with self.assertRaisesRegex(ValueError, "one segment"):

@@ -11,7 +11,9 @@ import subprocess
 import sys
 import tempfile
 import unittest
+from xml.etree import ElementTree
 
+import h5py
 import numpy
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
@@ -211,6 +213,101 @@ class Runs(JudgedRuns):
         other = self.simulate("springs", "other.h5", "--frames", "4", "--scene", finer, "--fault", "spin_lost")
         status, document, text = self.relate(*runs[:2], other, "--map", "refine")
         self.assertEqual((status, self.failed(document)), (1, ["converges"]), text)
+
+    def test_continuous_integration_reads_each_property_once(self):
+        path, report = self.simulate("springs", "run.h5", "--fault", "heals"), self.folder / "junit.xml"
+        done = subprocess.run([os.environ["CUTPROOF"], "check", path, "--json", self.folder / "verdicts.json", "--junit",
+                               report], capture_output=True, text=True, env=os.environ | {"GITHUB_ACTIONS": "true"})
+        self.assertEqual(done.returncode, 1, done.stderr)
+        document = json.loads((self.folder / "verdicts.json").read_text())
+        cases = {case.get("name"): case for case in ElementTree.parse(report).iter("testcase")}
+        judged = [verdict["property"] for verdict in document["verdicts"]]
+        skipped = [one["property"] for one in document["not_judged"]]
+        self.assertEqual(list(cases), judged + skipped)
+        for name, case in cases.items():
+            kinds = [child.tag for child in case]
+            self.assertEqual(kinds, ["failure"] if name in self.failed(document) else
+                             ["skipped"] if name in skipped else [])
+        verdict = next(one for one in document["verdicts"] if one["property"] == ACROSS)
+        failure = cases[ACROSS].find("failure")
+        self.assertEqual(failure.get("message"), verdict["witness"]["text"])
+        particles = ", ".join(str(particle) for particle in verdict["witness"]["particles"])
+        self.assertTrue(failure.text.startswith(
+            f"'{ACROSS}' fails in frame {verdict['frame']} at particles {particles}: measured "), failure.text)
+        self.assertIn(f"see it again: cutproof check {path}", failure.text)
+        for words in ("after skin", "backend", "1 of 1"):
+            self.assertNotIn(words, failure.text)
+        notes = [line for line in done.stdout.splitlines() if line.startswith("::")]
+        self.assertEqual(len(notes), len(self.failed(document)))
+        self.assertIn(f"::error title=cutproof: {ACROSS}::{verdict['witness']['text']}; "
+                      f"see it again: cutproof check {path}", "\n".join(notes))
+
+    def write_skin(self, before, after, promises="free skin", last=None):
+        """A bar that is cut in frame 2 of 4, with these surfaces; `last`: the one of frame 3. Where the surface stays,
+        nothing else is told anew either."""
+        path = self.folder / "run.h5"
+        x = numpy.stack(numpy.meshgrid(numpy.arange(4.0), numpy.arange(2.0), numpy.arange(2.0), indexing="ij"), 3)
+        x = x.reshape(-1, 3)
+        with cutproof_run.Writer(path, rest=x, spacing=1.0, promises=promises) as run:
+            for frame in range(4):
+                blade = numpy.full((1, 4, 3), numpy.nan)
+                if frame == 2:
+                    blade[0] = [[1.5, -9, -9], [1.5, 9, -9], [1.5, 9, 9], [1.5, -9, 9]]
+                skin = before if frame < 2 else last if frame == 3 and last else after
+                groups = {} if after is before else dict(groups=[range(16)] if frame < 2 else [range(8), range(8, 16)])
+                run.frame(x, blade=blade, **groups, **skin)
+        return path
+
+    def test_the_skin_is_closed_and_goes_around_each_piece(self):
+        corner = numpy.stack(numpy.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), 3).reshape(-1, 3)
+        faces = numpy.array([[0, 1, 3], [0, 3, 2], [4, 7, 5], [4, 6, 7], [0, 5, 1], [0, 4, 5], [2, 3, 7], [2, 7, 6],
+                             [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]])
+
+        def boxes(*ends):
+            return dict(vertices=numpy.concatenate([[low - 0.4, -0.4, -0.4] + corner * [high - low + 0.8, 1.8, 1.8]
+                                                    for low, high in ends]),
+                        triangles=numpy.concatenate([8 * k + faces for k in range(len(ends))]))
+
+        one, two, three = boxes((0, 3)), boxes((0, 1), (2, 3)), boxes((0, 1), (2, 2), (3, 3))
+        open_one = dict(two, triangles=two["triangles"][:-1])
+        turned = dict(two, triangles=numpy.concatenate([two["triangles"][:-1], two["triangles"][-1:, ::-1]]))
+        nowhere = dict(two, vertices=numpy.where(numpy.arange(16)[:, None] == 5, numpy.nan, two["vertices"]))
+        gone = dict(vertices=numpy.zeros((0, 3)), triangles=numpy.zeros((0, 3), int))
+        status, document, text = self.check(self.write_skin(one, two))
+        self.assertEqual((status, self.failed(document)), (0, []), text)
+        self.assertLessEqual({"skin surface", "skin match"}, {one["property"] for one in document["verdicts"]})
+        self.assertIn("skin geometry", [one["property"] for one in document["not_judged"]])
+        for before, after, last, wanted, frame in (
+                (one, one, None, "skin match", 2), (two, two, None, "skin match", 0), (one, three, None, "skin match", 2),
+                (one, open_one, None, "skin surface", 2), (one, turned, None, "skin surface", 2),
+                (one, two, nowhere, "skin surface", 3), (one, gone, None, "skin surface", 2)):
+            with self.subTest(wanted=wanted, frame=frame):
+                status, document, _ = self.check(self.write_skin(before, after, last=last))
+                found = [(v["property"], v["frame"]) for v in document["verdicts"] if not v["holds"]]
+                self.assertEqual((status, found), (1, [(wanted, frame)]))
+        # Who does not promise it may have one surface around pieces that touch.
+        status, document, text = self.check(self.write_skin(one, one, promises="free"))
+        self.assertEqual(status, 0, text)
+        self.assertIn({"property": "skin match", "why": "needs the promise 'skin'"}, document["not_judged"])
+
+    def test_a_recording_is_a_run_too(self):
+        for scene in ("small_block", "three_cuts", "uniform_stretch"):
+            with self.subTest(scene=scene):
+                path = self.folder / scene
+                subprocess.run([os.environ["CUTPROOF"], "run", ROOT / f"fixtures/scenes/{scene}.json", "--record", path], check=True,
+                               stdout=subprocess.DEVNULL)
+                document = self.folder / "verdicts.json"
+                done = subprocess.run([os.environ["CUTPROOF"], "check", path, "--as-run", "--json", document],
+                                      capture_output=True, text=True)
+                self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+                judged = {v["property"] for v in json.loads(document.read_text())["verdicts"]}
+                self.assertLessEqual({"linear momentum", "what is gone stays gone", ACROSS}, judged)
+                with h5py.File(f"{path}.cutproof.h5") as index, h5py.File(f"{path}.particles.vtkhdf", "r+") as particles:
+                    particles["VTKHDF/PointData/velocity"][index["snapshots/velocity_row"][-1]] += [0, 0, 100]
+                done = subprocess.run([os.environ["CUTPROOF"], "check", path, "--as-run", "--json", document],
+                                      capture_output=True, text=True)
+                self.assertEqual(done.returncode, 1, done.stdout + done.stderr)
+                self.assertIn("linear momentum", self.failed(json.loads(document.read_text())))
 
     def test_forms_of_a_file_have_the_same_verdicts(self):
         told = []

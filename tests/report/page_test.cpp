@@ -268,6 +268,14 @@ TEST(Holders, OfBrokenClustersReadNothingThatIsNotThere) {
   for (const int32_t number : {5, 6, 7, 8}) EXPECT_TRUE(members_of(clusters, number, 3).empty()) << number;
 }
 
+TEST(Pieces, OfWhatIsCoupledAreJoinedByWhatIsAlive) {
+  Clusters clusters;
+  clusters.offsets = {0, 2, 4, 5, 99};
+  clusters.members = {3, 2, 2, 0, 4};
+  EXPECT_EQ(coupled_of(clusters, {1, 1, 1, 1, 1}), (std::vector<int32_t>{0, -1, 0, 0, 4}));
+  EXPECT_EQ(coupled_of(clusters, {1, 1, 0, 1, 1}), (std::vector<int32_t>{0, -1, -1, 3, 4}));
+}
+
 // --- Pictures ---
 
 Finding finding_in(int64_t frame) {

@@ -1,0 +1,24 @@
+// The skin of a run of somebody else's simulator, judged where it is new or the blade has been (tolerances.md, Runs).
+#pragma once
+#include <optional>
+#include <vector>
+
+#include "harness/foreign_judge.h"
+#include "harness/foreign_run.h"
+
+namespace cutproof::harness {
+
+class RunSkin {
+ public:
+  // After `judge` has seen the frame.
+  void see(const RunFrames& frames, const oracles::RunJudge& judge);
+  // Adds verdicts and what was not judged; nothing of a run without a skin.
+  void finish(bool is_promised, JudgedRun& judged) const;
+
+ private:
+  void take(std::optional<Verdict>& known, Verdict verdict, int64_t frame);
+  std::optional<Verdict> surface_, match_;
+  bool was_open_ = false;
+};
+
+}  // namespace cutproof::harness

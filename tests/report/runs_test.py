@@ -1,0 +1,131 @@
+#!/usr/bin/env python3
+"""Pages of runs of anybody's simulator in a real browser: they open where something fails, or where the blade has cut
+last; witness, pieces, coupling and the blade's sweep are seen; a large run stays small.
+Usage: runs_test.py CUTPROOF SOURCES WORK
+Exit status 77 where there is no browser (browser.py)."""
+import json
+import pathlib
+import sys
+
+import numpy
+
+from browser import Browser, By, Folder
+
+program, sources = sys.argv[1], pathlib.Path(sys.argv[2])
+work = Folder(sys.argv[3], program)
+sys.path.insert(0, str(sources / "guests" / "python"))
+import cutproof_run  # noqa: E402
+
+
+def page_of(name, status):
+    work.run([program, "check", f"{name}.h5", "--json", f"{name}.json", "--report", f"{name}.html"], status)
+    return work / f"{name}.html", json.loads((work / f"{name}.json").read_text())
+
+
+def simulate(simulator, name, *options):
+    work.run(["/usr/bin/python3", "-B", sources / f"guests/examples/runs/{simulator}.py", f"{name}.h5", *options], 0)
+
+
+def listed(document, holds):
+    return [verdict for verdict in document["verdicts"] if verdict["holds"] == holds]
+
+
+# --- A run that fails opens at its first failure, with the witness marked ---
+
+simulate("springs", "heals", "--fault", "heals")
+path, document = page_of("heals", 1)
+first = min(listed(document, False), key=lambda verdict: verdict["frame"])
+with Browser(path) as page:
+    page.shown(first["frame"], 0)
+    page.picture(work / "heals.png")
+    summary, status = page.text("#summary"), page.text("#status")
+    assert f"'{first['property']}' fails" in summary and f"in frame {first['frame']}." in summary, summary
+    assert document["pieces"]["in_words"] in summary and "after" not in summary, summary
+    assert status.startswith(f"Frame {first['frame']} ") and "coupling group" in status, status
+    assert first["witness"]["text"] in page.text("#witness"), page.text("#witness")
+    marks = page.data("findings[0].marks")
+    assert marks["particles"] == first["witness"]["particles"] and marks["exact"], marks
+    assert page.pixels()["orange"] > 0, "the witness is not seen"
+    table = page.text("#verdicts")
+    assert not any(f"after {stage}" in table for stage in ("step", "skin")), table
+    rows = {row["property"]: row for row in page.data("rows")}
+    for verdict in document["verdicts"]:
+        assert rows[verdict["property"]]["judged"] == 1 and verdict["property"] in table, verdict
+    for one in document["not_judged"]:
+        assert one["property"] in table and one["why"] in table, one
+    buttons = [button.text for button in page.driver.find_elements(By.CSS_SELECTOR, "#view button")]
+    assert "Frame »" in buttons and not any("Stage" in text for text in buttons), buttons
+    options = [option.get_attribute("value") for option in page.driver.find_elements(By.CSS_SELECTOR, "#colour option")]
+    assert options[:2] == ["piece", "cluster"] and "change" not in options, options
+    # What is coupled though the blade has been between has one colour, and two as pieces.
+    moment = first["frame"]
+    assert page.data(f"moments[{moment}].components") == 2
+    page.choose("colour", "cluster")
+    page.until("return document.getElementById('legend').textContent.includes('are coupled with each other')")
+    page.picture(work / "heals_coupled.png")
+    # It plays to its end.
+    page.driver.find_element(By.ID, "play").click()
+    page.until("return document.documentElement.dataset.moment == arguments[0]", document["run"]["frames"] - 1)
+
+# --- One that holds opens where the blade has parted tissue last, and shows what it swept ---
+
+simulate("tetrahedra", "holds")
+path, document = page_of("holds", 0)
+last_cut = document["pieces"]["last_cut"]
+with Browser(path) as page:
+    page.shown(last_cut)
+    page.picture(work / "holds.png")
+    assert page.text("#findings-title") == "Nothing fails"
+    assert len(page.data(f"moments[{last_cut}].swept")) == 12, page.data(f"moments[{last_cut}].swept")
+    assert "Steel" in page.text("#blade-words"), page.text("#legend")
+    page.scrub(0)
+    assert page.data("moments[0].swept") == [] and "Steel" not in page.text("#legend")
+    assert page.text("#status").startswith("Frame 0 ") and page.data("moments[0].components") == 1
+    page.scrub(document["run"]["frames"] - 1)
+    assert "2 pieces" in page.text("#status"), page.text("#status")
+    for plot in page.driver.find_elements(By.CSS_SELECTOR, ".plot"):
+        assert "as loaded" not in plot.text, plot.text
+
+# --- Particles that come later, and a skin of its own ---
+
+x = numpy.stack(numpy.meshgrid(*3 * [numpy.arange(4.0)], indexing="ij"), 3).reshape(-1, 3) * 0.01
+corners = numpy.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]) * 0.05
+with cutproof_run.Writer(work / "grows.h5", spacing=0.01, promises="free") as run:
+    for frame in range(4):
+        there = numpy.concatenate([x, x[:2 * frame] + 0.05])
+        run.frame(there + 0.001 * frame, groups=[range(len(there))], vertices=corners + 0.001 * frame,
+                  triangles=[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+path, document = page_of("grows", 0)
+with Browser(path) as page:
+    page.shown(0)
+    assert "piece" not in [option.get_attribute("value")
+                           for option in page.driver.find_elements(By.CSS_SELECTOR, "#colour option")]
+    for frame in range(4):
+        assert page.data(f"moments[{frame}].particles") == 64 + 2 * frame
+    page.scrub(3)
+    particles = page.pixels()["sum"]
+    page.pixels_after(lambda: page.choose("show", "skin"), {particles})
+    page.picture(work / "grows.png")
+
+# --- A page stays small, and says what it leaves out ---
+
+x = numpy.stack(numpy.meshgrid(*3 * [numpy.arange(20.0)], indexing="ij"), 3).reshape(-1, 3) * 0.01
+random = numpy.random.default_rng(1)
+print("seed 1")
+with cutproof_run.Writer(work / "large.h5", rest=x, spacing=0.01, promises="free") as run:
+    for frame in range(700):
+        swept = numpy.full((1, 4, 3), numpy.nan)
+        if 100 <= frame < 110:
+            low, high = 0.02 * (frame - 100) - 0.005, 0.02 * (frame - 99)
+            swept[0] = [[0.095, -1, low], [0.095, 1, low], [0.095, 1, high], [0.095, -1, high]]
+        run.frame(x + 1e-3 * random.normal(size=x.shape), blade=swept)
+path, document = page_of("large", 0)
+assert path.stat().st_size < 33e6, path.stat().st_size
+with Browser(path) as page:
+    about = page.text("#about")
+    assert "it shows one frame in" in about and "stage" not in about, about
+    frames = page.data("moments.map((moment) => moment.frame)")
+    assert len(frames) < 700 and frames[-1] == 699, frames
+    # What was swept in frames that are left out is seen in the next one.
+    assert sum(len(swept) for swept in page.data("moments.map((moment) => moment.swept)")) == 10 * 12
+print("pages of runs are as they should be")
