@@ -95,15 +95,23 @@ bool goes_on(Vec3 a, Vec3 b, const Vec3* quad, double near) {
 
 }  // namespace
 
-std::vector<std::array<int32_t, 2>> tissue_at_rest(std::span<const Vec3> rest, double h) {
+std::optional<std::vector<std::array<int32_t, 2>>> tissue_at_rest(std::span<const Vec3> rest, double h) {
   using Key = std::array<int64_t, 3>;
   const auto key_of = [&](Vec3 x) {
     return Key{std::llround(std::floor(x.x / h)), std::llround(std::floor(x.y / h)), std::llround(std::floor(x.z / h))};
   };
   std::map<Key, std::vector<int32_t>> boxes;
-  for (std::size_t i = 0; i < rest.size(); ++i) boxes[key_of(rest[i])].push_back(static_cast<int32_t>(i));
+  for (std::size_t i = 0; i < rest.size(); ++i) {
+    if (is_blank(rest[i])) continue;
+    if (!(std::max({std::abs(rest[i].x), std::abs(rest[i].y), std::abs(rest[i].z)}) < kFarthestInSpacings * h))
+      return std::nullopt;
+    std::vector<int32_t>& box = boxes[key_of(rest[i])];
+    box.push_back(static_cast<int32_t>(i));
+    if (box.size() > kMostWithinSpacing) return std::nullopt;
+  }
   std::vector<std::array<int32_t, 2>> joined;
   for (std::size_t i = 0; i < rest.size(); ++i) {
+    if (is_blank(rest[i])) continue;
     const Key key = key_of(rest[i]);
     for (int64_t k = 0; k < 125; ++k) {
       const auto box = boxes.find({key[0] + k % 5 - 2, key[1] + k / 5 % 5 - 2, key[2] + k / 25 - 2});

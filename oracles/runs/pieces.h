@@ -3,6 +3,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -11,8 +12,12 @@
 namespace cutproof::oracles {
 
 // What is tissue at rest: pairs of particles at most 1.1 h apart along one axis, and no more than 0.2 h along the
-// others together; pairs of cells that have a face in common. `corners`: 4 or 8.
-std::vector<std::array<int32_t, 2>> tissue_at_rest(std::span<const Vec3> rest, double h);
+// others together; pairs of cells that have a face in common. `corners`: 4 or 8. Particles that rest nowhere (NaN) join
+// none. Nothing if h is not how far they are apart: in a box of h there are more than some, where all pairs would be
+// too many, or one is so far away that h is about as large as its rounding.
+inline constexpr std::size_t kMostWithinSpacing = 64;
+inline constexpr double kFarthestInSpacings = 0x1p50;
+std::optional<std::vector<std::array<int32_t, 2>>> tissue_at_rest(std::span<const Vec3> rest, double h);
 std::vector<std::array<int32_t, 2>> tissue_of_cells(std::span<const int32_t> cells, int corners);
 
 // Units of tissue are particles, or cells where a run has cells.

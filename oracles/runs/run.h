@@ -2,6 +2,7 @@
 // (docs/reference/run.md). Needs no body, scene or backend.
 #pragma once
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -11,6 +12,9 @@
 #include "model/vec.h"
 
 namespace cutproof::oracles {
+
+// A place where nothing is.
+inline bool is_blank(Vec3 x) { return std::isnan(x.x) && std::isnan(x.y) && std::isnan(x.z); }
 
 // What an author vouches for beyond what every run is asked.
 enum class RunPromise : uint8_t {

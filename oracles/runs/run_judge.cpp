@@ -44,8 +44,8 @@ constexpr double kStable = 4;
 // How much faster than any velocity at the ends of frames those in between may be, about their mean.
 constexpr double kBetween = 2;
 
-bool is_number(Vec3 x) { return std::isfinite(x.x) && std::isfinite(x.y) && std::isfinite(x.z); }
-bool is_blank(Vec3 x) { return std::isnan(x.x) && std::isnan(x.y) && std::isnan(x.z); }
+// One whose square is none is beyond all bounds.
+bool is_number(Vec3 x) { return std::isfinite(dot(x, x)); }
 
 // A sum of many. In double precision each addition of equal numbers may round the same way, by more in all than bounds
 // allow.
@@ -87,14 +87,28 @@ class RunJudge::Implementation {
   }
 
   void couple(RunCoupling coupling) {
-    coupling_ = std::move(coupling);
-    const bool has_groups = !coupling_.offsets.empty();  // none is an answer, too: nothing is coupled
-    if (has_groups && (coupling_.offsets.front() != 0 || coupling_.offsets.back() != std::ssize(coupling_.members) ||
-                       !std::is_sorted(coupling_.offsets.begin(), coupling_.offsets.end()))) {
-      fail(kForm, {}, "groups_offsets do not begin at 0, ascend and end at {} members", coupling_.members.size());
-      coupling_ = {};
+    // What is not given anew goes on.
+    if (coupling.corners == 0) {
+      coupling.cells = std::move(coupling_.cells);
+      coupling.corners = coupling_.corners;
     }
-    is_coupled_ = has_groups || coupling_.corners > 0;
+    if (coupling.offsets.empty()) {
+      coupling.offsets = std::move(coupling_.offsets);
+      coupling.members = std::move(coupling_.members);
+      coupling.weights = std::move(coupling_.weights);
+    }
+    coupling_ = std::move(coupling);
+    const std::vector<int64_t>& offsets = coupling_.offsets;
+    if (!offsets.empty() && (offsets.front() != 0 || offsets.back() != std::ssize(coupling_.members) ||
+                             !std::is_sorted(offsets.begin(), offsets.end()))) {
+      fail(kForm, {}, "groups_offsets do not begin at 0, ascend and end at {} members", coupling_.members.size());
+    }
+    if (const auto bad = std::find_if_not(coupling_.weights.begin(), coupling_.weights.end(),
+                                          [](double weight) { return std::isfinite(weight); });
+        bad != coupling_.weights.end()) {
+      fail(kForm, {}, "weight {} of groups_weights is {}", bad - coupling_.weights.begin(), *bad);
+    }
+    is_coupled_ = !offsets.empty() || coupling_.corners > 0;  // no groups are an answer, too: nothing is coupled
     is_new_coupling_ = true;
   }
 
@@ -111,9 +125,10 @@ class RunJudge::Implementation {
     if (n_ < std::ssize(was_)) {
       return fail(kForm, {}, "frame {} has {} particles, and the one before has {}", frame_, n_, was_.size());
     }
-    if (frame.time && time_was_ && !(*frame.time > *time_was_)) {
-      return fail(kForm, {}, "time does not ascend: {} s after {} s", *frame.time, *time_was_);
+    if (frame.time && (!std::isfinite(*frame.time) || (time_was_ && !(*frame.time > *time_was_)))) {
+      return fail(kForm, {}, "time does not ascend: {} s after {} s", *frame.time, time_was_.value_or(0));
     }
+    if (!check_blade(frame) || !check_parents(frame)) return;
     if (is_new_coupling_ && !check_members()) return;
     find_existing(frame);
     check_finite(frame);
@@ -146,7 +161,7 @@ class RunJudge::Implementation {
     if (frames_ == 0) fail(kForm, {}, "the run has no frames");
     // Where no blade was ever shown, nobody knows what it may have parted.
     if (!has_blade_) found_[kWithin].verdict = fresh(kWithin);
-    if (has_blade_ && tissue_) {
+    if (has_blade_ && tissue_ && holds(kForm) && holds(kFinite)) {
       Verdict& verdict = found_[kSomethingCut].verdict;
       verdict.checked = 1;
       // What the blade takes away parts tissue, too.
@@ -252,7 +267,7 @@ class RunJudge::Implementation {
     ++found.verdict.checked;
     const bool is_first_failure = !found.verdict.holds && found.verdict.frame == frame_ && std::isfinite(found.nearest);
     if (!found.verdict.holds && !is_first_failure) return true;
-    const bool is_within = measured <= bound;
+    const bool is_within = measured <= bound && std::isfinite(bound);
     const double ratio = is_within ? (bound > 0 ? measured / bound : 0) : std::numeric_limits<double>::infinity();
     if (ratio > found.nearest) {
       found.nearest = ratio;
@@ -273,6 +288,25 @@ class RunJudge::Implementation {
     }
     if (const auto bad = wrong(coupling_.cells); bad != coupling_.cells.end()) {
       fail(kForm, {}, "a cell has particle {} of {}", *bad, n_);
+      return false;
+    }
+    return true;
+  }
+
+  // Each patch is there, or, with no corner at all, is none.
+  bool check_blade(const RunFrame& frame) {
+    for (std::size_t k = 0; k + 4 <= frame.blade.size(); k += 4) {
+      const auto corners = frame.blade.subspan(k, 4);
+      if (std::ranges::all_of(corners, is_number) || std::ranges::all_of(corners, is_blank)) continue;
+      fail(kForm, {}, "patch {} of the blade has corners that are no numbers in frame {}", k / 4, frame_);
+      return false;
+    }
+    return true;
+  }
+  bool check_parents(const RunFrame& frame) {
+    for (std::size_t i = parent_.size(); i < frame.parent.size(); ++i) {
+      if (frame.parent[i] >= -1 && frame.parent[i] < n_) continue;
+      fail(kForm, {}, "particle {} was split from {} of {}", i, frame.parent[i], n_);
       return false;
     }
     return true;
@@ -304,11 +338,20 @@ class RunJudge::Implementation {
     int64_t wrong = 0;
     for (std::size_t i = 0; i < exists_.size(); ++i) {
       if (exists_[i] == 0) continue;
-      const bool fine = is_number(frame.positions[i]) && (frame.velocities.empty() || is_number(frame.velocities[i]));
-      if (fine) continue;
+      const char* const wrong_one = !is_number(frame.positions[i])                                 ? "position"
+                                    : !frame.velocities.empty() && !is_number(frame.velocities[i]) ? "velocity"
+                                    : !frame.spin.empty() && !is_number(frame.spin[i])             ? "spin"
+                                                                                                   : nullptr;
+      if (wrong_one == nullptr) continue;
       ++wrong;
-      fail(kFinite, {{}, {static_cast<int32_t>(i)}}, "the {} of particle {} is not a number in frame {}",
-           is_number(frame.positions[i]) ? "velocity" : "position", i, frame_);
+      fail(kFinite, {{}, {static_cast<int32_t>(i)}}, "the {} of particle {} is not a number in frame {}", wrong_one, i,
+           frame_);
+    }
+    for (const auto& [is_fine, name] : {std::pair{is_number(frame.contact_impulse.value_or(Vec3{})), "contact_impulse"},
+                                        std::pair{std::isfinite(frame.energy.value_or(0)), "energy"}}) {
+      if (is_fine) continue;
+      ++wrong;
+      fail(kFinite, {}, "{} is not a number in frame {}", name, frame_);
     }
     within(kFinite, static_cast<double>(wrong), 0);
   }
@@ -326,6 +369,10 @@ class RunJudge::Implementation {
   }
 
   void lay_tissue() {
+    for (std::size_t i = 0; i < header_.rest.size(); ++i) {
+      if (is_number(header_.rest[i]) || is_blank(header_.rest[i])) continue;
+      return fail(kForm, {{}, {static_cast<int32_t>(i)}}, "the place of rest of particle {} is not a number", i);
+    }
     if (coupling_.corners > 0) {
       unit_corners_ = coupling_.corners;
       units_ = static_cast<int32_t>(std::ssize(coupling_.cells) / unit_corners_);
@@ -341,7 +388,12 @@ class RunJudge::Implementation {
       return;
     }
     if (std::ssize(header_.rest) != n_ || !(header_.spacing > 0)) return;
-    tissue_.emplace(units_, tissue_at_rest(header_.rest, header_.spacing));
+    if (auto joined = tissue_at_rest(header_.rest, header_.spacing)) {
+      tissue_.emplace(units_, *std::move(joined));
+    } else {
+      fail(kForm, {}, "particles do not rest about spacing = {} m apart: more than {} within that, or beyond {:.2g} m",
+           header_.spacing, kMostWithinSpacing, kFarthestInSpacings * header_.spacing);
+    }
   }
 
   // Each particle goes where its velocity takes it: nothing may jump.
@@ -530,7 +582,7 @@ class RunJudge::Implementation {
         x[k] = frame.positions[at(i)];
         exists &= exists_[at(i)] != 0;
         const int32_t of = rest_of(i);
-        has_rest &= of >= 0;
+        has_rest &= of >= 0 && is_number(header_.rest[at(of)]);
         if (has_rest) rest[k] = header_.rest[at(of)];
       }
       if (!exists) continue;
@@ -557,7 +609,8 @@ class RunJudge::Implementation {
 
   void cut(const RunFrame& frame) {
     has_blade_ |= !frame.blade.empty();
-    if (!tissue_ || (by_cells() && std::ssize(coupling_.cells) != int64_t{units_} * unit_corners_)) {
+    if (!tissue_ || (by_cells() && (coupling_.corners != unit_corners_ ||
+                                    std::ssize(coupling_.cells) != int64_t{units_} * unit_corners_))) {
       if (tissue_) found_[kAcross].why = found_[kWithin].why = "the number of cells changes";
       tissue_.reset();
       unit_corners_ = 0;
@@ -598,7 +651,7 @@ class RunJudge::Implementation {
       int32_t first = -1;
       for (std::size_t k = 0; k < members.size(); ++k) {
         const int32_t i = members[k];
-        if (exists_[at(i)] == 0 || (!weights.empty() && !(weights[k] > header_.u))) continue;
+        if (exists_[at(i)] == 0 || (!weights.empty() && !(std::abs(weights[k]) > header_.u))) continue;
         if (first >= 0) sets.unite(first, i);
         first = i;
       }

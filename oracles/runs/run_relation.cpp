@@ -61,7 +61,6 @@ Verdict fresh(Which which) {
   return verdict;
 }
 
-bool is_blank(Vec3 x) { return std::isnan(x.x) && std::isnan(x.y) && std::isnan(x.z); }
 bool exists(const RunFrame& frame, std::size_t i) {
   return i < frame.positions.size() && !is_blank(frame.positions[i]) && (frame.alive.empty() || frame.alive[i] != 0) &&
          (frame.removed.empty() || frame.removed[i] == 0);

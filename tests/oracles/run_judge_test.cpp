@@ -179,16 +179,73 @@ TEST(RunJudge, KnowsTheFacesThatCellsShare) {
     RunFrame frame;
     frame.positions = x;
     judge.see(frame);
-    // Groups alone are no tissue: nothing more is known of pieces.
+    EXPECT_EQ(judge.pieces().pieces, 1);
+    // Groups alone leave cells as they are.
     RunCoupling groups;
     groups.offsets = {0, 2};
     groups.members = {0, 4};
-    EXPECT_EQ(judge.pieces().pieces, 1);
     judge.couple(groups);
+    judge.see(frame);
+    EXPECT_EQ(judge.pieces().units, 2);
+    // Without cells there is no tissue: nothing more is known of pieces.
+    cells.cells.clear();
+    judge.couple(cells);
     judge.see(frame);
     judge.finish();
     EXPECT_EQ(judge.pieces().units, 0);
   }
+}
+
+// What one frame of particles, which have nothing else, fails.
+std::string failing_of(const RunHeader& header, RunFrame frame, const std::vector<Vec3>& x) {
+  RunJudge judge(header);
+  frame.positions = x;
+  judge.see(frame);
+  judge.finish();
+  std::string names;
+  for (const Verdict& verdict : judge.verdicts()) {
+    if (!verdict.holds) names += verdict.property + ": " + verdict.witness.text;
+  }
+  return names;
+}
+
+// A wrong spacing must not make pairs of all particles.
+TEST(RunJudge, RejectsASpacingThatIsNotThatOfItsParticles) {
+  RunHeader header;
+  header.spacing = 1;
+  header.rest.assign(64, {0.5, 0.5, 0.5});
+  EXPECT_EQ(failing_of(header, {}, header.rest), "");
+  header.rest.push_back({0.9, 0, 0});
+  EXPECT_NE(failing_of(header, {}, header.rest).find("run well formed: particles do not rest about spacing"),
+            std::string::npos);
+  header.rest.assign(1'000'000, {0.5, 0.5, 0.5});
+  EXPECT_NE(failing_of(header, {}, header.rest).find("run well formed"), std::string::npos);
+  header.rest = {{0, 0, 0}, {0x1p49, 0, 0}};
+  EXPECT_EQ(failing_of(header, {}, header.rest), "");
+  header.rest.back().x = 0x1p50;
+  EXPECT_NE(failing_of(header, {}, header.rest).find("run well formed"), std::string::npos);
+  header.rest.back() = {NAN, NAN, NAN};  // nowhere
+  EXPECT_EQ(failing_of(header, {}, {{}, {}}), "");
+}
+
+TEST(RunJudge, RejectsNumbersOfAFrameThatAreNone) {
+  const std::vector<Vec3> x = {{}, {1, 0, 0}}, wrong = {{}, {0, INFINITY, 0}};
+  RunFrame frame;
+  frame.spin = x;
+  frame.energy = 1;
+  frame.contact_impulse = Vec3{1, 0, 0};
+  EXPECT_EQ(failing_of({}, frame, x), "");
+  const auto expect = [&](const char* text, auto&& plant) {
+    RunFrame planted = frame;
+    plant(planted);
+    EXPECT_EQ(failing_of({}, planted, x), text);
+  };
+  expect("finite: energy is not a number in frame 0", [](RunFrame& f) { f.energy = NAN; });
+  expect("finite: contact_impulse is not a number in frame 0", [](RunFrame& f) { f.contact_impulse->z = NAN; });
+  expect("finite: the spin of particle 1 is not a number in frame 0", [&](RunFrame& f) { f.spin = wrong; });
+  const std::vector<int32_t> parent = {-1, 2}, itself = {0, -1};
+  expect("run well formed: particle 1 was split from 2 of 2", [&](RunFrame& f) { f.parent = parent; });
+  expect("", [&](RunFrame& f) { f.parent = itself; });
 }
 
 // A step of semi-implicit or implicit damping is off the exponential by the square of c dt.
@@ -339,6 +396,34 @@ INSTANTIATE_TEST_SUITE_P(
                               b.mass.clear();
                             }},
                       Fault{"no_number", "finite", [](Bar& b) { b.x[kLate][5].y = NAN; }},
+                      Fault{"too_large_to_be_squared", "finite", [](Bar& b) { b.v[kLate][5].y = 1e200; }},
+                      Fault{"fewer_particles", "run well formed",
+                            [](Bar& b) {
+                              b.x[kLate].pop_back();
+                              b.v[kLate].pop_back();
+                              b.alive[kLate].pop_back();
+                              b.piece[kLate].pop_back();
+                              b.coupling[kLate] = {};
+                            }},
+                      Fault{"descending_offsets", "run well formed",
+                            [](Bar& b) { std::swap(b.coupling[kLate].offsets[3], b.coupling[kLate].offsets[4]); }},
+                      Fault{"members_of_no_group", "run well formed", [](Bar& b) { b.coupling[kLate].offsets = {0}; }},
+                      Fault{"a_weight_that_is_no_number", "run well formed",
+                            [](Bar& b) {
+                              b.coupling[kLate].weights.assign(b.coupling[kLate].members.size(), 1);
+                              b.coupling[kLate].weights.back() = NAN;
+                            }},
+                      Fault{"a_negative_weight", "no coupling across pieces",
+                            [](Bar& b) {
+                              b.coupling[kLate] = Bar::springs(false);
+                              b.coupling[kLate].weights.assign(b.coupling[kLate].members.size(), -1);
+                            }},
+                      Fault{"half_a_patch", "run well formed", [](Bar& b) { b.blade[4][2].z = NAN; }},
+                      Fault{"a_patch_without_end", "run well formed", [](Bar& b) { b.blade[4][2].z = INFINITY; }},
+                      Fault{"endless_time", "run well formed", [](Bar& b) { b.time.back() = INFINITY; }},
+                      Fault{"rest_without_end", "run well formed", [](Bar& b) { b.header.rest[7].x = INFINITY; }},
+                      Fault{"bounds_without_end", "linear momentum, centre of mass, angular momentum",
+                            [](Bar& b) { b.mass.assign(24, 1e300); }},
                       Fault{"said_otherwise", "pieces as said", [](Bar& b) { b.piece[kLate][0] = 7; }},
                       Fault{"blade_beside", "something was cut, pieces coupled within, pieces as said",
                             [](Bar& b) {
