@@ -32,7 +32,7 @@ JudgedRun judge_run(io::RunSegments segments,
       for (const Array& array : segment.contents().arrays) judged.given.insert(array.name);
       judged.notes.insert(judged.notes.end(), segment.arrays().notes().begin(), segment.arrays().notes().end());
       if (std::vector<double> mass = segment.mass(); !mass.empty()) judge->weigh(std::move(mass));
-      if (std::optional<oracles::RunCoupling> coupling = segment.coupling()) judge->couple(std::move(*coupling));
+      if (frames.has_new_coupling()) judge->couple(*frames.coupling());
     }
     judge->see(frame);
     skin.see(frames, *judge);

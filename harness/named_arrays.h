@@ -35,6 +35,8 @@ class NamedArrays {
   // Throws InputError unless both are there or neither.
   bool both(std::string_view a, std::string_view b) const;
 
+  // Throws InputError if there are numbers and they are no integers.
+  void require_whole(const Array& array) const;
   // Whole numbers, each of 32 bits.
   std::vector<int32_t> integers(const Array& array) const;
   std::vector<int64_t> long_integers(const Array& array) const;
@@ -49,7 +51,6 @@ class NamedArrays {
   const std::vector<std::string>& notes() const { return notes_; }  // for whoever reads what became of the file
 
  private:
-  void require_whole(const Array& array) const;
   const io::ArrayFile& contents_;
   const std::string& file_;
   std::vector<std::string> notes_;

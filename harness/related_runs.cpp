@@ -30,12 +30,7 @@ class OpenRun {
 
   bool next() {
     if (!frames_.next()) return false;
-    is_new_coupling_ = false;
     if (!frames_.begins_segment()) return true;
-    if (std::optional<RunCoupling> coupling = frames_.segment().coupling()) {
-      coupling_ = std::move(*coupling);
-      is_new_coupling_ = true;
-    }
     if (std::vector<double> mass = frames_.segment().mass(); !mass.empty()) mass_ = std::move(mass);
     return true;
   }
@@ -43,14 +38,12 @@ class OpenRun {
   const RunSegment& segment() const { return frames_.segment(); }
   bool begins_segment() const { return frames_.begins_segment(); }
   const std::vector<double>& mass() const { return mass_; }
-  RelatedRun where() const { return {frames_.frame(), coupling_ ? &*coupling_ : nullptr, is_new_coupling_}; }
+  RelatedRun where() const { return {frames_.frame(), frames_.coupling(), frames_.has_new_coupling()}; }
 
  private:
   std::string path_;
   RunFrames frames_;
-  std::optional<RunCoupling> coupling_;
   std::vector<double> mass_;
-  bool is_new_coupling_ = false;
 };
 
 // Several bodies that were run alone, as one run: particles of the first, then of the next.
@@ -239,8 +232,7 @@ JudgedRelation judge_relation(const oracles::RunMap& map, const RelatedFiles& fi
     }
     if (map.needs_time() && !first.where().frame.time)
       throw InputError(files.first, "time", "A boost needs to know when frames are.", "Write time.");
-    if (map.name() == "permute" && others.front()->begins_segment() &&
-        (judged.frames == 0 || others.front()->segment().arrays().has("permutation")))
+    if (map.name() == "permute" && judged.frames == 0)
       relation->permute(permutation_of(first.segment(), others.front()->segment(), others.front()->path()));
     if (!has_mass) relation->weigh(first.mass(), second.mass());
     has_mass = true;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "model/at.h"
+#include "model/io/limits.h"
 #include "oracles/rounding.h"
 
 namespace cutproof::harness {
@@ -82,11 +83,11 @@ RunSegment::RunSegment(io::ArrayFile contents, std::string file, int64_t frame)
       in_(contents_, file_, run_arrays(), run_texts()),
       first_(frame) {
   const Array& positions = in_.require_either("positions", {-1, -1, 3}, {-1, 3});
+  if (positions.count() == 0)
+    in_.refuse("positions", "There are no frames, or no particles.", "Write at least one of both.");
   is_one_ = positions.shape.size() == 2;
   frames_ = is_one_ ? 1 : positions.shape[0];
   particles_ = positions.shape[is_one_ ? 0 : 1];
-  if (frames_ == 0 || particles_ == 0)
-    in_.refuse("positions", "There are no frames, or no particles.", "Write at least one of both.");
   if (particles_ > kMost)
     in_.refuse("positions", "There are more particles than 32-bit numbers can name.", "Write fewer.");
   precision_ = precision_of(positions);
@@ -125,7 +126,7 @@ oracles::RunFrame RunSegment::frame(int64_t k) const {
   made.removed = part(removed_);
   // A frame in which the blade sweeps nothing has none.
   made.blade = part(blade_);
-  if (std::ranges::all_of(made.blade, [](Vec3 x) { return std::isnan(x.x + x.y + x.z); })) made.blade = {};
+  if (std::ranges::all_of(made.blade, oracles::is_blank)) made.blade = {};
   made.parent = parent_;
   if (k == 0) made.piece = piece_;
   if (!impulse_.empty()) made.contact_impulse = impulse_[at(k)];
@@ -153,9 +154,12 @@ std::vector<uint8_t> RunSegment::flags(std::string_view name) const {
   const Array* const found = find(name, {particles_});
   std::vector<uint8_t> made;
   if (found == nullptr) return made;
-  for (const int64_t flag : in_.long_integers(*found)) {
+  in_.require_whole(*found);
+  made.resize(at(found->count()));
+  for (std::size_t k = 0; k < made.size(); ++k) {
+    const int64_t flag = found->integer(static_cast<int64_t>(k));
     if (flag != 0 && flag != 1) in_.refuse(name, fmt::format("It holds {}.", flag), "Write 1 or 0.");
-    made.push_back(static_cast<uint8_t>(flag));
+    made[k] = static_cast<uint8_t>(flag);
   }
   return made;
 }
@@ -167,6 +171,10 @@ std::vector<Vec3> RunSegment::quads() const {
   const std::size_t each = at(blade.shape[blade.shape.size() - 2]);
   if (each != 3 && each != 4)
     in_.refuse("blade", fmt::format("Its patches have {} corners.", each), "Write triangles or quads.");
+  const int64_t patches = blade.count() / (frames_ * static_cast<int64_t>(each) * 3);
+  if (patches > io::kMostPatches)
+    in_.refuse("blade", fmt::format("It has {} patches in a frame, more than {}.", patches, io::kMostPatches),
+               "Write a coarser sweep.");
   const std::vector<Vec3> corners = in_.vectors(blade);
   for (std::size_t k = 0; k + each <= corners.size(); k += each) {
     for (std::size_t c = 0; c < 4; ++c) made.push_back(corners[k + std::min(c, each - 1)]);
@@ -181,8 +189,9 @@ std::span<const T> RunSegment::of_frame(const std::vector<T>& all, int64_t k) co
 
 double RunSegment::positive(std::string_view name, double otherwise, bool may_be_zero) const {
   const std::optional<double> given = in_.number(name);
-  if (given && !(may_be_zero ? *given >= 0 : *given > 0)) {
-    in_.refuse(name, fmt::format("It is {}.", *given), may_be_zero ? "Write 0 or more." : "Write more than 0.");
+  if (given && !((may_be_zero ? *given >= 0 : *given > 0) && std::isfinite(*given))) {
+    in_.refuse(name, fmt::format("It is {}.", *given),
+               may_be_zero ? "Write 0 or more, finite." : "Write more than 0, finite.");
   }
   return given.value_or(otherwise);
 }
@@ -191,7 +200,11 @@ oracles::RunHeader RunSegment::header() const {
   oracles::RunHeader header;
   const int64_t n = particles_;
   if (const Array* const rest = in_.find("rest", {n, 3})) header.rest = in_.vectors(*rest);
-  if (const Array* const gravity = in_.find("gravity", {3})) header.gravity = in_.vectors(*gravity).front();
+  if (const Array* const gravity = in_.find("gravity", {3})) {
+    header.gravity = in_.vectors(*gravity).front();
+    if (!is_finite(*header.gravity))
+      in_.refuse("gravity", "It holds what is no number.", "Write m/s², or leave it out.");
+  }
   if (const Array* const edges = in_.find("edges", {-1, 2})) {
     const std::vector<int32_t> ends = in_.integers(*edges);
     for (std::size_t k = 0; k < ends.size(); k += 2) header.edges.push_back({ends[k], ends[k + 1]});
@@ -200,6 +213,10 @@ oracles::RunHeader RunSegment::header() const {
   header.damping = positive("damping", 0, true);
   header.cut_resolution = positive("cut_resolution", 0, true);
   header.u = positive("unit_roundoff", unit_roundoff(precision_), false);
+  if (header.u > 0x1p-12) {
+    in_.refuse("unit_roundoff", fmt::format("It is {}. Half precision has too few digits to be judged.", header.u),
+               "Write what the arithmetic rounds by, in single precision 6e-8.");
+  }
   header.steps = in_.whole_number("steps").value_or(1);
   if (header.steps < 1) in_.refuse("steps", fmt::format("It is {}.", header.steps), "Write the substeps in a frame.");
   if (const Array* const nodes = in_.find("nodes", {n, 3})) {
@@ -221,15 +238,18 @@ std::optional<oracles::RunCoupling> RunSegment::coupling() const {
   oracles::RunCoupling coupling;
   if (in_.both("groups_offsets", "groups_members")) {
     coupling.offsets = in_.long_integers(in_.require("groups_offsets", {-1}));
+    if (coupling.offsets.empty())
+      in_.refuse("groups_offsets", "It is empty.",
+                 "Write where each group begins, and the number of all members; at least 0.");
     coupling.members = in_.integers(in_.require("groups_members", {-1}));
     const auto members = std::ssize(coupling.members);
     if (const Array* const weights = in_.find("groups_weights", {members})) coupling.weights = in_.numbers(*weights);
   }
   if (in_.has("cells")) {
     const Array& cells = in_.require("cells", {-1, -1});
-    coupling.corners = static_cast<int>(cells.shape[1]);
+    coupling.corners = static_cast<int>(std::min<int64_t>(cells.shape.back(), 9));
     if (coupling.corners != 4 && coupling.corners != 8) {
-      in_.refuse("cells", fmt::format("They have {} corners.", coupling.corners), "Write tetrahedra or hexahedra.");
+      in_.refuse("cells", fmt::format("They have {} corners.", cells.shape.back()), "Write tetrahedra or hexahedra.");
     }
     coupling.cells = in_.integers(cells);
   }
@@ -241,12 +261,21 @@ std::vector<double> RunSegment::mass() const {
   if (found == nullptr) return {};
   std::vector<double> masses = in_.numbers(*found);
   for (const double m : masses) {
-    if (!(m > 0)) in_.refuse("mass", fmt::format("It holds {}.", m), "Write masses above 0, in kg.");
+    if (!(m > 0 && std::isfinite(m)))
+      in_.refuse("mass", fmt::format("It holds {}.", m), "Write masses above 0, in kg.");
   }
   return masses;
 }
 
 std::span<const Vec3> RunSegment::vertices(int64_t k) const { return of_frame(vertices_, k); }
+
+void RunSegment::refuse_what_is_given_once() const {
+  for (const std::string_view name : {"rest", "gravity", "spacing", "steps", "damping", "edges", "nodes",
+                                      "cut_resolution", "unit_roundoff", "permutation", "promises"}) {
+    if (in_.has(name) || find_text(contents_, name) != nullptr)
+      in_.refuse(name, "It is given once in a run, and this is a later segment.", "Write it into the first one only.");
+  }
+}
 
 bool RunFrames::next() {
   if (!segment_ || ++in_segment_ == segment_->frames()) {
@@ -259,13 +288,31 @@ bool RunFrames::next() {
     if (begun_++ == 0) {
       header_ = segment_->header();
       precision_ = segment_->precision();
+    } else {
+      segment_->refuse_what_is_given_once();
     }
     if (segment_->triangles()) triangles_ = segment_->triangles();
+    std::optional<oracles::RunCoupling> coupling = segment_->coupling();
+    is_new_coupling_ = coupling.has_value();
+    if (coupling) renew(std::move(*coupling));
     if (segment_->has_vertices() && !triangles_)
       segment_->arrays().refuse("vertices", "There are no triangles.", "Write triangles, too.");
   }
   frame_ = segment_->frame(in_segment_);
   return true;
+}
+
+void RunFrames::renew(oracles::RunCoupling given) {
+  if (coupling_ && given.corners == 0) {
+    given.cells = std::move(coupling_->cells);
+    given.corners = coupling_->corners;
+  }
+  if (coupling_ && given.offsets.empty()) {
+    given.offsets = std::move(coupling_->offsets);
+    given.members = std::move(coupling_->members);
+    given.weights = std::move(coupling_->weights);
+  }
+  coupling_ = std::move(given);
 }
 
 std::optional<Skin> RunFrames::skin() const {

@@ -39,6 +39,8 @@ class RunSegment {
   oracles::RunFrame frame(int64_t k) const;           // k-th of the segment, whose spans live as long as it
 
   oracles::RunHeader header() const;  // what is given once: of the first segment
+  // Of a later segment: it would be passed over, whatever it said.
+  void refuse_what_is_given_once() const;
   // Nothing where this segment does not give them anew.
   std::optional<oracles::RunCoupling> coupling() const;
   std::vector<double> mass() const;  // [n] [kg]
@@ -89,17 +91,24 @@ class RunFrames {
   // Of the first segment, which alone gives them; valid after the last frame, too.
   const oracles::RunHeader& header() const { return *header_; }
   Precision precision() const { return precision_; }
+  // What holds in the frame: what a segment does not give anew goes on. Null: nothing was given yet.
+  const oracles::RunCoupling* coupling() const { return coupling_ ? &*coupling_ : nullptr; }
+  bool has_new_coupling() const { return begins_segment() && is_new_coupling_; }
   // The skin of the frame; its vertices have no owners.
   std::optional<Skin> skin() const;
   bool has_new_triangles() const { return begins_segment() && segment_->triangles().has_value(); }
 
  private:
+  void renew(oracles::RunCoupling given);
+
   io::RunSegments segments_;
   std::unique_ptr<RunSegment> segment_;
   oracles::RunFrame frame_;
   std::optional<oracles::RunHeader> header_;
   Precision precision_ = Precision::binary64;
   std::optional<RunSegment::Triangles> triangles_;
+  std::optional<oracles::RunCoupling> coupling_;
+  bool is_new_coupling_ = false;
   int64_t before_ = 0, in_segment_ = 0, begun_ = 0;  // frames before the segment; the frame in it; segments
 };
 

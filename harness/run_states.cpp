@@ -139,8 +139,8 @@ void RunStates::take() {
 }
 
 void RunStates::take_coupling() {
-  const std::optional<oracles::RunCoupling> given = frames_->segment().coupling();
-  if (!given) return;
+  if (!frames_->has_new_coupling()) return;
+  const oracles::RunCoupling* const given = frames_->coupling();
   Clusters& groups = state_.clusters;
   groups = {};
   const auto add = [&](std::span<const int32_t> members, std::span<const double> weights) {

@@ -170,21 +170,26 @@ void ArrayCollector::require_new(const std::string& name) const {
 }
 
 void ArrayCollector::require_sum(const std::string& name, uint64_t bytes) const {
-  if (bytes <= most_bytes()) return;
   if (bytes > kMostArrayBytes) {
     throw InputError(file_, name, fmt::format("With this array there are more than {} bytes.", kMostArrayBytes),
                      "Write fewer frames or a smaller body.");
   }
+  if (bytes > most_inflated(file_bytes_)) refuse_inflation(name);
+}
+
+void ArrayCollector::refuse_inflation(const std::string& name) const {
   throw InputError(file_, name,
                    fmt::format("With this array a file of {} bytes becomes more than {}.", file_bytes_,
                                bytes_text(most_inflated(file_bytes_))),
                    "Write it without compression.");
 }
 
-void ArrayCollector::announce(const std::string& name, uint64_t bytes) {
+void ArrayCollector::announce(const std::string& name, uint64_t bytes, uint64_t each) {
   require_new(name);
   require_sum(name, bytes > kMostArrayBytes ? bytes : bytes_ + bytes);
   bytes_ += bytes;
+  read_bytes_ += bytes / each * kReadAs;
+  if (read_bytes_ > most_inflated(file_bytes_)) refuse_inflation(name);
 }
 
 void ArrayCollector::add(const std::string& name, RawNumbers raw) {

@@ -29,9 +29,11 @@ Array array_of(std::string name, RawNumbers raw, const std::string& file);
 // Adds to what was read. Throws InputError if the name is taken, if it is no plain name, or if the limits are exceeded.
 class ArrayCollector {
  public:
+  // Bytes of a number: whoever reads some makes numbers of 64 bits of them.
+  static constexpr uint64_t kReadAs = 8;
   ArrayCollector(std::string file, uint64_t file_bytes) : file_(std::move(file)), file_bytes_(file_bytes) {}
-  // Before an array of that size is allocated.
-  void announce(const std::string& name, uint64_t bytes);
+  // Before an array of that size is allocated; `each`: bytes of one of its numbers.
+  void announce(const std::string& name, uint64_t bytes, uint64_t each = kReadAs);
   void add(const std::string& name, RawNumbers raw);
   void add(const std::string& name, const std::vector<std::string>& texts, bool is_attribute = false);
   void ignore(std::string name) { contents_.ignored.push_back(std::move(name)); }
@@ -41,11 +43,11 @@ class ArrayCollector {
 
  private:
   void require_new(const std::string& name) const;
-  uint64_t most_bytes() const { return std::min(kMostArrayBytes, most_inflated(file_bytes_)); }
+  [[noreturn]] void refuse_inflation(const std::string& name) const;
   std::string file_;
   uint64_t file_bytes_;
   ArrayFile contents_;
-  uint64_t bytes_ = 0;
+  uint64_t bytes_ = 0, read_bytes_ = 0;
 };
 
 // Of a file that is known to begin as such a file does.

@@ -56,12 +56,13 @@ void collect(const hdf5::File& file, const std::string& path, const hdf5::Id& gr
     if (without && without(name)) continue;
     const hdf5::Values values = hdf5::Values::of_dataset(group.get(), name, kMostArrayBytes, file.bytes());
     if (values.kind() == hdf5::ValueKind::real && values.bytes_each() == 2) refuse_half_precision(path, name);
-    found.announce(name, values.bytes());
     if (values.kind() == hdf5::ValueKind::text) {
+      found.announce(name, values.bytes());
       if (values.shape().size() > 1) throw hdf5::Error(name, "A text is one string, or a list of them.");
       found.add(name, values.texts(kMostTextBytes));
       continue;
     }
+    found.announce(name, values.bytes(), static_cast<uint64_t>(values.bytes_each()));
     RawNumbers raw{kind_of(values.kind()), values.bytes_each(), values.shape(), {}};
     raw.bytes.resize(values.bytes());
     values.read(raw.bytes.data());
@@ -78,14 +79,14 @@ void collect_attributes(const hdf5::File& file, const hdf5::Id& root, ArrayColle
   }
 }
 
-// Calls read(file) with HDF5's errors as those of the input.
+// Calls read(file) with HDF5's errors as those of the input, or of a part of it.
 template <class Read>
-void read_file(const std::string& path, const Read& read) {
+void read_file(const std::string& path, const Read& read, const std::string& part = "") {
   const hdf5::Quiet quiet;
   try {
     read(hdf5::File::open(path));
   } catch (const hdf5::Error& error) {
-    throw InputError(path, error.where() == path ? "" : error.where(), error.what(), kArraysRemedy);
+    throw InputError(path + part, error.where() == path ? "" : error.where(), error.what(), kArraysRemedy);
   }
 }
 
@@ -120,16 +121,18 @@ std::vector<std::string> hdf5_segments(const std::string& path) {
 }
 
 ArrayFile read_hdf5_segment(const std::string& path, const std::string& segment, bool with_root) {
-  ArrayCollector found(path, require_regular_file(path));
-  read_file(path, [&](const hdf5::File& file) {
+  const std::string part = "/" + segment;
+  ArrayCollector found(path + part, require_regular_file(path));
+  const auto read = [&](const hdf5::File& file) {
     const hdf5::Id root = hdf5::open_group(file.id(), "/");
     if (with_root) {
       const auto is_other = [](const std::string& name) { return is_segment_name(name) || name.ends_with(".part"); };
       collect(file, path, root, kMostSegments, is_other, found);
       collect_attributes(file, root, found);
     }
-    collect(file, path, hdf5::open_group(root.get(), segment), kMostArrays, {}, found);
-  });
+    collect(file, path + part, hdf5::open_group(root.get(), segment), kMostArrays, {}, found);
+  };
+  read_file(path, read, part);
   return found.take();
 }
 

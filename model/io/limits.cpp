@@ -42,7 +42,8 @@ too, and for `/dev/stdin` unless it is a file (`< scene.json`): write into a
 file first what comes through a pipe.
 
 **What is compressed** (recordings, NPZ, HDF5) is refused before it is inflated
-if it would become larger than the last two limits say. HDF5 files hold
+if it would become larger than the last two limits say, each number of a file of
+arrays counted as 8 bytes, all segments of a run together. HDF5 files hold
 everything themselves: links to other files, soft links, data in other files
 (external storage, virtual datasets) and filters that are not HDF5's own are
 refused, and no filter is loaded.
@@ -101,6 +102,7 @@ std::string limits_reference() {
   text += row("", "bytes of all arrays in memory, of a text",
               fmt::format("{}, {}", bytes_text(kMostArrayBytes), bytes_text(kMostTextBytes)));
   text += row("A run (`check`)", "segments, each with the arrays of one file", count_text(kMostSegments));
+  text += row("", "patches of the blade in a frame", count_text(kMostPatches));
   text +=
       row("A recording (`check`, `digest`, `report`)", "snapshots", count_text(static_cast<uint64_t>(kMostSnapshots)));
   text += row("What is compressed", "bytes that it may become in any case", bytes_text(kFreeInflation));

@@ -57,6 +57,7 @@ inline constexpr std::size_t kMostTextBytes = std::size_t{1} << 15;
 
 // Of a run of another simulator.
 inline constexpr std::size_t kMostSegments = 1'000'000;
+inline constexpr int64_t kMostPatches = 10'000;  // of a blade's sweep in a frame
 
 // Of a recording.
 inline constexpr int64_t kMostSnapshots = 1'000'000;

@@ -353,7 +353,7 @@ class NpzReader {
     if (bytes != left || std::any_of(header.shape.begin(), header.shape.end(), has_no_end)) {
       refuse(name_, fmt::format("It has {} bytes, which do not fit its shape.", left), kNpzRemedy);
     }
-    found_.announce(name_, bytes);
+    is_text ? found_.announce(name_, bytes) : found_.announce(name_, bytes, bytes_each);
     if (kind == 'f' && each == 2) refuse_half_precision(path_, name_);
     const bool big_endian = order == '>' && kind != 'S';
     if (is_text) return read_texts(header, kind, big_endian, bytes, left);

@@ -1,5 +1,7 @@
 #include "model/io/run_segments.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <system_error>
@@ -7,6 +9,7 @@
 
 #include "model/error.h"
 #include "model/io/array_parts.h"
+#include "model/io/input_file.h"
 #include "model/io/recorded_segments.h"
 
 namespace cutproof::io {
@@ -28,11 +31,13 @@ std::string number_of(const std::filesystem::path& file) {
 std::vector<std::string> files_in(const std::string& folder) {
   std::vector<std::string> files;
   std::error_code failed;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, failed)) {
-    if (!number_of(entry.path()).empty()) files.push_back(entry.path().string());
+  std::filesystem::directory_iterator entry(folder, failed);
+  for (; !failed && entry != std::filesystem::directory_iterator(); entry.increment(failed)) {
+    if (!number_of(entry->path()).empty()) files.push_back(entry->path().string());
+    if (files.size() > kMostSegments)
+      throw InputError(folder, "", "There are too many files.", "Write longer segments.");
   }
   if (failed) throw InputError(folder, "", "The folder cannot be read.", "Check its permissions.");
-  if (files.size() > kMostSegments) throw InputError(folder, "", "There are too many files.", "Write longer segments.");
   std::sort(files.begin(), files.end());
   const auto series = [](const std::string& file) { return file.substr(0, file.size() - std::size("000000.npz") + 1); };
   for (const std::string& file : files) {
@@ -42,6 +47,18 @@ std::vector<std::string> files_in(const std::string& folder) {
     }
   }
   return files;
+}
+
+// A segment that got lost would only make bounds wider. Numbers may count steps, of which every tenth was written.
+void require_equal_steps(const std::string& path, const std::vector<int64_t>& numbers) {
+  for (std::size_t k = 2; k < numbers.size(); ++k) {
+    if (numbers[k] - numbers[k - 1] == numbers[1] - numbers[0]) continue;
+    throw InputError(
+        path, "",
+        fmt::format("Its segments {:06}, {:06} and {:06} do not ascend by equal steps, as {:06} and {:06} do.",
+                    numbers[k - 2], numbers[k - 1], numbers[k], numbers[0], numbers[1]),
+        "Write all segments, with consecutive numbers.");
+  }
 }
 
 }  // namespace
@@ -86,6 +103,10 @@ RunSegments::RunSegments(std::string path) : path_(std::move(path)), source_(pat
   if (names_.empty()) {
     throw InputError(path_, "", "This folder has no file of a run.", "Write 000000.npz, 000001.npz, … into it.");
   }
+  std::vector<int64_t> numbers;
+  for (const std::string& name : names_) numbers.push_back(std::stoll(is_folder_ ? number_of(name) : name));
+  require_equal_steps(path_, numbers);
+  if (!is_folder_) file_bytes_ = require_regular_file(path_);
 }
 
 std::optional<ArrayFile> RunSegments::next() {
@@ -95,7 +116,18 @@ std::optional<ArrayFile> RunSegments::next() {
   const std::string& name = names_[next_];
   const bool is_first = next_++ == 0;
   source_ = is_folder_ ? name : path_ + "/" + name;
-  return is_folder_ ? read_array_file(name) : read_hdf5_segment(path_, name, is_first);
+  if (is_folder_) file_bytes_ += require_regular_file(name);
+  ArrayFile contents = is_folder_ ? read_array_file(name) : read_hdf5_segment(path_, name, is_first);
+  // One small dataset may be in a million segments, by links.
+  for (const Array& array : contents.arrays)
+    read_bytes_ += ArrayCollector::kReadAs * static_cast<uint64_t>(array.count());
+  if (read_bytes_ > most_inflated(file_bytes_)) {
+    throw InputError(source_, "",
+                     fmt::format("With this segment {} bytes of files become more than {}.", file_bytes_,
+                                 bytes_text(most_inflated(file_bytes_))),
+                     "Write segments of their own, without compression.");
+  }
+  return contents;
 }
 
 }  // namespace cutproof::io

@@ -1,6 +1,7 @@
 // A run of any simulator in segments, each of which is a file of arrays by itself (docs/reference/run.md): one NPZ; an
 // HDF5 file with a group for each; a folder with an NPZ for each; or a recording.
 #pragma once
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -22,7 +23,7 @@ class RunSegments {
 
   // Of any kind. Throws what read_array_file and RecordingReader throw, and InputError if there is no segment.
   static RunSegments of(const std::string& path);
-  // Requires has_segments(path). Throws InputError if there is no segment.
+  // Requires has_segments(path). Throws InputError if there is no segment, or if one between others is missing.
   explicit RunSegments(std::string path);
   // Those that are in memory; `source`: what errors name.
   RunSegments(std::string source, std::vector<ArrayFile> segments)
@@ -32,7 +33,7 @@ class RunSegments {
   static RunSegments of_recording(const std::string& name);
 
   // The next one, or nothing after the last; the first with what is given once per run. Throws what read_array_file
-  // throws.
+  // throws, and InputError if all so far have become more than files of their size may.
   std::optional<ArrayFile> next();
   // What errors name: the file of the last segment, or its group in the file.
   const std::string& source() const { return source_; }
@@ -45,6 +46,7 @@ class RunSegments {
   std::vector<ArrayFile> in_memory_;  // without names
   std::shared_ptr<RecordedSegments> recorded_;
   std::size_t next_ = 0;
+  uint64_t file_bytes_ = 0, read_bytes_ = 0;  // so far
 };
 
 }  // namespace cutproof::io

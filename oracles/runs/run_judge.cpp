@@ -87,16 +87,6 @@ class RunJudge::Implementation {
   }
 
   void couple(RunCoupling coupling) {
-    // What is not given anew goes on.
-    if (coupling.corners == 0) {
-      coupling.cells = std::move(coupling_.cells);
-      coupling.corners = coupling_.corners;
-    }
-    if (coupling.offsets.empty()) {
-      coupling.offsets = std::move(coupling_.offsets);
-      coupling.members = std::move(coupling_.members);
-      coupling.weights = std::move(coupling_.weights);
-    }
     coupling_ = std::move(coupling);
     const std::vector<int64_t>& offsets = coupling_.offsets;
     if (!offsets.empty() && (offsets.front() != 0 || offsets.back() != std::ssize(coupling_.members) ||

@@ -119,8 +119,8 @@ class RunRelation::Implementation {
                   a.frame.positions.size(), b.frame.positions.size());
     }
     if (!permutation_.empty() && permutation_.size() != a.frame.positions.size()) {
-      return fail(kFrames, {}, "frame {} has {} particles, and permutation names {}", frame_,
-                  a.frame.positions.size(), permutation_.size());
+      return fail(kFrames, {}, "frame {} has {} particles, and permutation names {}", frame_, a.frame.positions.size(),
+                  permutation_.size());
     }
     ++found_[kFrames].verdict.checked;
     if (frames_ == 1) begin(a.frame);

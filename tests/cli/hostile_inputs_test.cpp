@@ -77,6 +77,17 @@ std::function<void()> python(const std::string& program) {
     files::remove("make.py");
   };
 }
+// A run, "run": save(k, name=array, …) writes segment k, and x is a place for positions of two particles.
+std::function<void()> folder_of_a_run(const std::string& program) {
+  return python(
+      "import os\nos.mkdir('run')\nx = np.zeros((1, 2, 3))\n"
+      "def save(k, **arrays): np.savez(f'run/{k:06}.npz', **({'positions': x} | arrays))\n" +
+      program);
+}
+// A run, "input.h5", as f; the same x.
+std::function<void()> hdf5_of_a_run(const std::string& program) {
+  return python("x = np.zeros((1, 2, 3))\nf = h5py.File('input.h5', 'w')\n" + program);
+}
 // A recording, "input.cutproof.h5", whose index is then changed.
 std::function<void()> changed_recording(const std::string& program) {
   return [program] {
@@ -532,6 +543,119 @@ const std::vector<Hostile>& hostile_inputs() {
        python("with h5py.File('input.h5', 'w') as f: f.create_group(b'caf\\xe9')\n"),
        "check input.h5",
        {R"(caf\xe9)"}},
+
+      // --- Runs
+      {"ARunOfNothing", [] { files::create_directory("run"); }, "check run", {"run", "no file of a run"}},
+      {"AFolderThatIsNamedAsAFile",
+       [] { files::create_directory("input.h5"); },
+       "check input.h5",
+       {"no file of a run"}},
+      {"APipeInARun", folder_of_a_run("os.mkfifo('run/000000.npz')\n"), "check run", {"000000.npz", "a pipe"}},
+      {"AFolderInARun", folder_of_a_run("os.mkdir('run/000000.npz')\n"), "check run", {"000000.npz", "a folder"}},
+      {"ALinkToNothingInARun",
+       folder_of_a_run("save(0)\nos.symlink('away', 'run/000001.npz')\n"),
+       "check run",
+       {"000001.npz", "no such file"}},
+      {"ALinkToItselfInARun",
+       folder_of_a_run("os.symlink('000000.npz', 'run/000000.npz')\n"),
+       "check run",
+       {"000000.npz", "cannot be opened"}},
+      {"ATerabyteInARun",
+       folder_of_a_run("open('run/000000.npz', 'w').truncate(1 << 40)\n"),
+       "check run",
+       {"000000.npz", "neither"}},
+      {"ARunOfTwoSeries",
+       folder_of_a_run("save(0)\nos.rename('run/000000.npz', 'run/a_000000.npz')\nsave(1)\n"),
+       "check run",
+       {"another series"}},
+      {"ARunWithAGap", folder_of_a_run("for k in (0, 1, 3): save(k)\n"), "check run", {"000003", "equal steps"}},
+      {"AnHdf5RunWithAGap",
+       hdf5_of_a_run("for k in (0, 10, 20, 40): f[f'{k:06}/positions'] = x\n"),
+       "check input.h5",
+       {"000040", "equal steps"}},
+      {"ASegmentThatInflates",
+       hdf5_of_a_run("y = f.create_dataset('000000/vertices', (13107200, 3), 'f8', chunks=(43690, 3), "
+                     "compression='gzip')\n"
+                     "for k in range(300): y[k * 43690:(k + 1) * 43690] = 0\n"),
+       "check input.h5",
+       {"input.h5/000000", "vertices", "more than"}},
+      {"ASegmentThatClaimsMuch",
+       hdf5_of_a_run("f.create_dataset('000000/positions', (1, 1 << 27, 3), 'f8', chunks=(1, 1 << 16, 3))\n"),
+       "check input.h5",
+       {"input.h5/000000", "positions", "claims 3221225472 bytes"}},
+      {"ManySegmentsThatAreOne",  // 160 MiB, twice
+       hdf5_of_a_run("f['000000/positions'] = x\n"
+                     "y = f['000000'].create_dataset('vertices', (6990400, 3), 'f8', chunks=(43690, 3), "
+                     "compression='gzip')\n"
+                     "for k in range(160): y[k * 43690:(k + 1) * 43690] = 0\n"
+                     "for k in range(1, 1000): f[f'{k:06}'] = f['000000']\n"),
+       "check input.h5",
+       {"input.h5/000001", "become more than"}},
+      {"GroupsOfAHundredMillion",
+       hdf5_of_a_run("f['000000/positions'] = x\n"
+                     "f.create_dataset('000000/groups_offsets', data=[0, 10**8])\n"
+                     "f.create_dataset('000000/groups_members', data=np.zeros(10**8, 'u1'), compression='gzip')\n"),
+       "check input.h5",
+       {"groups_members", "becomes more than"}},
+      {"AHundredMillionGroups",
+       hdf5_of_a_run("f['000000/positions'] = x\n"
+                     "f.create_dataset('000000/groups_offsets', data=np.zeros(10**8, 'u1'), compression='gzip')\n"),
+       "check input.h5",
+       {"groups_offsets", "becomes more than"}},
+      {"ASegmentInAnotherFile",
+       hdf5_of_a_run("f['000000'] = h5py.ExternalLink('/etc/passwd', '/')\n"),
+       "check input.h5",
+       {"000000", "link"}},
+      {"ASegmentThatIsALinkToItself",
+       hdf5_of_a_run("f['000000'] = h5py.SoftLink('/000000')\n"),
+       "check input.h5",
+       {"000000", "link"}},
+      {"ASegmentWithinItself",
+       hdf5_of_a_run("f['000000/positions'] = x\nf['000000/rest'] = f['000000']\n"),
+       "check input.h5",
+       {"input.h5/000000", "rest", "no dataset"}},
+      {"PositionsInAnotherFile",
+       hdf5_of_a_run("f['000000/positions'] = x\nf['000001/positions'] = h5py.ExternalLink('/etc/passwd', '/')\n"),
+       "check input.h5",
+       {"input.h5/000001", "positions", "link"}},
+      {"ASegmentThatIsADataset", hdf5_of_a_run("f['000000'] = x\n"), "check input.h5", {"000000", "group"}},
+      {"ATypeThatIsNoneInARun",
+       hdf5_of_a_run("f['000000/positions'] = x\nf['000000/alive'] = np.zeros((1, 2), 'c16')\n"),
+       "check input.h5",
+       {"input.h5/000000", "alive", "neither numbers nor text"}},
+      {"PositionsWithoutAxes", folder_of_a_run("save(0, positions=[])\n"), "check run", {"positions", "no frames"}},
+      {"CellsWithoutAxes", folder_of_a_run("save(0, cells=np.zeros(0, int))\n"), "check run", {"cells", "0 corners"}},
+      {"OffsetsOfNoGroups",
+       folder_of_a_run("save(0, groups_offsets=[], groups_members=[])\n"),
+       "check run",
+       {"groups_offsets", "is empty"}},
+      {"ManyPatchesOfABlade",
+       folder_of_a_run("save(0, blade=np.zeros((1, 10001, 3, 3)))\n"),
+       "check run",
+       {"blade", "10001 patches", "10000"}},
+      {"AFlagThatIsNone",
+       folder_of_a_run("save(0, alive=np.full((1, 2), 2**40))\n"),
+       "check run",
+       {"alive", "1099511627776"}},
+      {"AMassThatIsNoNumber", folder_of_a_run("save(0, mass=[np.inf, 1])\n"), "check run", {"mass", "It holds inf"}},
+      {"GravityThatIsNoNumber", folder_of_a_run("save(0, gravity=[0, 0, np.nan])\n"), "check run", {"gravity"}},
+      {"ASpacingWithoutEnd", folder_of_a_run("save(0, spacing=np.inf)\n"), "check run", {"spacing", "It is inf"}},
+      {"ARoundoffThatForgivesAll",
+       folder_of_a_run("save(0, unit_roundoff=1.0)\n"),
+       "check run",
+       {"unit_roundoff", "too few digits"}},
+      {"APromiseInALaterSegment",
+       folder_of_a_run("save(0)\nsave(1, promises='free')\n"),
+       "check run",
+       {"000001.npz", "promises", "once"}},
+      {"APromiseOfManyBytes",
+       folder_of_a_run("save(0, promises='free ' * 10000)\n"),
+       "check run",
+       {"promises", "50000 bytes"}},
+      {"AnEscapeInAPromise",
+       folder_of_a_run("save(0, promises='\\x1b[31m')\n"),
+       "check run",
+       {"promises", R"(\x1b[31m)"}},
 
       // --- Recordings
       {"ARecordingThatInflates",

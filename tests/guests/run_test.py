@@ -370,11 +370,42 @@ class Runs(JudgedRuns):
 
     def test_values_that_cannot_be_fail_the_form(self):
         path = self.folder / "run.npz"
-        for offsets, members in (([0, 2], [0, 9]), ([1, 2], [0, 1]), ([0, 2, 1], [0, 1])):
-            numpy.savez(path, positions=numpy.zeros((2, 4, 3)), groups_offsets=offsets, groups_members=members)
-            status, document, _ = self.check(path)
-            self.assertEqual(status, 1)
-            self.assertEqual(self.failed(document), ["run well formed"])
+        x, none = numpy.zeros((2, 4, 3)), numpy.nan
+        patch = numpy.array([[[[0, 0, 0], [1, 0, 0], [0, 1, none]]]] * 2)
+        for arrays in (dict(groups_offsets=[0, 2], groups_members=[0, 9]),
+                       dict(groups_offsets=[0, 2], groups_members=[0, -1]),
+                       dict(groups_offsets=[1, 2], groups_members=[0, 1]),
+                       dict(groups_offsets=[0, 2, 1], groups_members=[0, 1]),
+                       dict(groups_offsets=[0], groups_members=[0, 1]),
+                       dict(groups_offsets=[0, 2], groups_members=[0, 1], groups_weights=[1, none]),
+                       dict(cells=[[0, 1, 2, 4]]), dict(edges=[[0, 4]]), dict(blade=patch),
+                       dict(time=[0, none]), dict(time=[1, 1]), dict(rest=[[none, 0, 0]] * 4, spacing=1.0),
+                       dict(parent=[-1, -1, -1, 4])):
+            with self.subTest(arrays):
+                numpy.savez(path, positions=x, **arrays)
+                status, document, _ = self.check(path)
+                self.assertEqual(status, 1)
+                self.assertEqual(self.failed(document), ["run well formed"])
+
+    def test_a_wrong_spacing_is_named_and_takes_no_memory(self):
+        numpy.savez(self.folder / "run.npz", positions=numpy.zeros((1, 200000, 3)), rest=numpy.zeros((200000, 3)),
+                    spacing=1.0)
+        _, document, text = self.check(self.folder / "run.npz")
+        self.assertEqual(self.failed(document), ["run well formed"])
+        self.assertIn("spacing = 1", text)
+        self.assertLess(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss, 500 * 1024)
+
+    def test_groups_and_cells_go_on_each_by_itself(self):
+        folder = self.folder / "run"
+        folder.mkdir()
+        x = numpy.array([[0, 0, 1], [0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
+        for k in range(3):
+            more = [dict(cells=[[1, 2, 3, 0]]), dict(groups_offsets=[0, 2], groups_members=[0, 1]), {}][k]
+            numpy.savez(folder / f"{10 * k:06}.npz", positions=x, **more)  # numbers of steps
+        status, document, text = self.check(folder)
+        self.assertEqual((status, document["pieces"]["units"]), (0, 1), text)
+        inverted = [v for v in document["verdicts"] if v["property"] == "no inverted cell"]
+        self.assertEqual([v["checked"] for v in inverted], [3])
 
 
 if __name__ == "__main__":

@@ -180,8 +180,7 @@ TEST(RunJudge, KnowsTheFacesThatCellsShare) {
     frame.positions = x;
     judge.see(frame);
     EXPECT_EQ(judge.pieces().pieces, 1);
-    // Groups alone leave cells as they are.
-    RunCoupling groups;
+    RunCoupling groups = cells;
     groups.offsets = {0, 2};
     groups.members = {0, 4};
     judge.couple(groups);
