@@ -10,7 +10,7 @@ cd "$(dirname "$0")/.."
 seconds=${1:-600}
 [[ $seconds =~ ^[1-9][0-9]*$ ]] || { echo "ci/input_fuzzing.sh: \"$seconds\" is not a number of seconds" >&2; exit 2; }
 shift $(($# > 0))
-all=(scene stl obj ply off recording recording_contents arrays counterexample campaign results question)
+all=(scene stl obj ply off recording recording_contents arrays counterexample campaign results question run)
 targets=("$@")
 [ $# -gt 0 ] || targets=("${all[@]}")
 for target in "${targets[@]}"; do
@@ -31,7 +31,7 @@ TMPDIR=$(mktemp -d "$memory/cutproof_fuzzing_XXXXXX")
 export TMPDIR
 trap 'rm -rf "$TMPDIR"' EXIT
 
-declare -A longest=([scene]=8192 [stl]=4096 [obj]=4096 [ply]=4096 [off]=4096 [recording]=65536 [recording_contents]=96 [arrays]=16384 [counterexample]=8192 [campaign]=16384 [results]=16384 [question]=16384)
+declare -A longest=([scene]=8192 [stl]=4096 [obj]=4096 [ply]=4096 [off]=4096 [recording]=65536 [recording_contents]=96 [arrays]=16384 [counterexample]=8192 [campaign]=16384 [results]=16384 [question]=16384 [run]=16384)
 table=$(printf '%-20s %11s %8s %9s %7s %9s' target executions seconds coverage corpus findings)
 status=0
 for target in "${targets[@]}"; do
@@ -47,7 +47,7 @@ for target in "${targets[@]}"; do
   [ -s "$seeds.dict" ] && words=(-dict="$seeds.dict")
   # HDF5 keeps what it frees, which looks like a leak after every input; the replay under ASan looks for leaks at its end.
   leaks=1
-  [[ $target == recording* || $target == arrays ]] && leaks=0
+  [[ $target == recording* || $target == arrays || $target == run ]] && leaks=0
   limits=(-detect_leaks="$leaks" -max_len="${longest[$target]}" -rss_limit_mb=2048 -malloc_limit_mb=1024 -timeout=20)
 
   echo "== $target: $seconds s, seed $seed"

@@ -6,6 +6,7 @@
 #include "harness/foreign_judge.h"
 #include "harness/recorded_kick.h"
 #include "model/io/array_file.h"
+#include "tests/input_fuzzing/array_edits.h"
 #include "tests/input_fuzzing/targets.h"
 
 namespace cutproof::input_fuzzing {
@@ -87,37 +88,7 @@ void judge(const io::ArrayFile& contents) {
   }
 }
 
-// '0' and an NPZ file, '1' and an HDF5 file, or '2' to '4' and edits of 11 bytes of one of the small files: which
-// array; what is done; where; a value.
-void edit(io::ArrayFile& file, std::string_view bytes) {
-  for (; bytes.size() >= 11; bytes.remove_prefix(11)) {
-    if (file.arrays.empty()) return;
-    const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(bytes[k]); };
-    Array& array = file.arrays[byte(0) % file.arrays.size()];
-    const auto each = static_cast<std::size_t>(size_of(array.type));
-    switch (byte(1) % 4) {
-      case 0:
-        if (!array.bytes.empty()) {
-          std::memcpy(array.bytes.data() + byte(2) % (array.bytes.size() / each) * each, bytes.data() + 3, each);
-        }
-        break;
-      case 1:  // another number of rows
-        if (!array.shape.empty()) {
-          array.shape[0] = byte(2) % 8;
-          array.bytes.resize(static_cast<std::size_t>(array.count()) * each);
-        }
-        break;
-      case 2:  // the same bytes as another type
-        array = Array{array.name, static_cast<ElementType>(1 + byte(2) % 5), {}, array.bytes};
-        array.shape = {static_cast<int64_t>(array.bytes.size()) / size_of(array.type)};
-        array.bytes.resize(static_cast<std::size_t>(array.count() * size_of(array.type)));
-        break;
-      default:
-        file.arrays.erase(file.arrays.begin() + (&array - file.arrays.data()));
-    }
-  }
-}
-
+// '0' and an NPZ file, '1' and an HDF5 file, or '2' to '4' and edits of one of the small files.
 Outcome feed(std::string_view bytes) {
   if (bytes.empty() || bytes[0] < '0' || bytes[0] > '4') return Outcome::refused;
   return outcome_of([&] {
@@ -155,12 +126,41 @@ std::vector<std::string> seeds() {
     seeds.push_back("0" + bytes_of_file(scratch_path("seed.npz")));
     seeds.push_back("1" + bytes_of_file(scratch_path("seed.h5")));
     // An edit that leaves the file one that can be understood: another value.
-    seeds.push_back(std::string(1, static_cast<char>('2' + k)) + std::string(11, '\0'));
+    seeds.push_back(std::string(1, static_cast<char>('2' + k)) + std::string(kEditBytes, '\0'));
   }
   return seeds;
 }
 
 }  // namespace of_arrays
+
+void edit(io::ArrayFile& file, std::string_view bytes) {
+  for (; bytes.size() >= kEditBytes; bytes.remove_prefix(kEditBytes)) {
+    if (file.arrays.empty()) return;
+    const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(bytes[k]); };
+    Array& array = file.arrays[byte(0) % file.arrays.size()];
+    const auto each = static_cast<std::size_t>(size_of(array.type));
+    switch (byte(1) % 4) {
+      case 0:
+        if (!array.bytes.empty()) {
+          std::memcpy(array.bytes.data() + byte(2) % (array.bytes.size() / each) * each, bytes.data() + 3, each);
+        }
+        break;
+      case 1:  // another number of rows
+        if (!array.shape.empty()) {
+          array.shape[0] = byte(2) % 8;
+          array.bytes.resize(static_cast<std::size_t>(array.count()) * each);
+        }
+        break;
+      case 2:  // the same bytes as another type
+        array = Array{array.name, static_cast<ElementType>(1 + byte(2) % 5), {}, array.bytes};
+        array.shape = {static_cast<int64_t>(array.bytes.size()) / size_of(array.type)};
+        array.bytes.resize(static_cast<std::size_t>(array.count() * size_of(array.type)));
+        break;
+      default:
+        file.arrays.erase(file.arrays.begin() + (&array - file.arrays.data()));
+    }
+  }
+}
 
 const Target kArrays = {"arrays", of_arrays::feed, of_arrays::seeds};
 

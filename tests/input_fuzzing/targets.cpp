@@ -35,9 +35,9 @@ class ScratchFolder {
 }  // namespace
 
 std::span<const Target> all_targets() {
-  static const std::array<Target, 12> targets = {
-      kScene,          kStl,      kObj,     kPly,     kOff, kRecording, kRecordingContents, kArrays,
-      kCounterexample, kCampaign, kResults, kQuestion};
+  static const std::array<Target, 13> targets = {
+      kScene,          kStl,      kObj,     kPly,      kOff, kRecording, kRecordingContents, kArrays,
+      kCounterexample, kCampaign, kResults, kQuestion, kRun};
   return targets;
 }
 

@@ -49,7 +49,7 @@ Outcome feed_document(std::string_view bytes, const std::string& thing, Read&& r
 
 // One for each reader, in files of their names.
 extern const Target kScene, kStl, kObj, kPly, kOff, kRecording, kRecordingContents, kArrays, kCounterexample, kCampaign,
-    kResults, kQuestion;
+    kResults, kQuestion, kRun;
 
 }  // namespace cutproof::input_fuzzing
 
