@@ -1,5 +1,5 @@
-"""A recording of this project, written as a run of anybody's simulator: the judge of runs finds right what the judge of
-recordings does, and what is planted in it. The environment names the program (CUTPROOF).
+"""A recording of this project as a run of anybody's simulator: the judge of runs accepts it, and finds what is planted in
+it. The environment names the program (CUTPROOF).
 """
 import os
 import subprocess
