@@ -220,7 +220,7 @@ constexpr std::size_t kMostPatches = 500, kPatchesOfPage = 20'000;
 json swept_json(const std::vector<Vec3>& corners, std::size_t most, int64_t& left_out) {
   std::vector<std::size_t> patches;
   for (std::size_t k = 0; k + 4 <= corners.size(); k += 4) {
-    if (std::all_of(&corners[k], &corners[k] + 4, [](Vec3 x) { return is_finite(x); })) patches.push_back(k);
+    if (std::all_of(&corners[k], &corners[k] + 4, [](Vec3 x) { return norm(x) < 1e30; })) patches.push_back(k);
   }
   json list = json::array();
   const std::size_t shown = std::min(patches.size(), most);
@@ -488,7 +488,7 @@ Chunks drawn(const Source& source, const Source* other, bool is_own, const std::
     json one = detail(source.setup, both.moment, state, pieces.count, alive);
     if (source.is_foreign()) {
       one["swept"] = swept_json(swept, most_patches, result.patches_left_out);
-      if (of_run.time) one["time"] = json_number(*of_run.time);
+      if (of_run.time && std::isfinite(*of_run.time)) one["time"] = *of_run.time;
     }
     if (other_walk && both.is_comparable) {
       const Apart apart = apart_of(state, other_walk->at_snapshot(is_own ? both.other : both.own), body.grid.spacing);

@@ -107,6 +107,22 @@ with Browser(path) as page:
     page.pixels_after(lambda: page.choose("show", "skin"), {particles})
     page.picture(work / "grows.png")
 
+# --- A hostile name, and little that is a number ---
+
+x = numpy.random.default_rng(1).random((6, 3))
+with cutproof_run.Writer(work / "<!--<script>.h5", rest=x, spacing=1e-3, edges=[[0, 1], [1, 2]]) as run:
+    for frame in range(6):
+        there = x.copy()
+        there[1:3] = {3: numpy.nan, 4: numpy.inf}.get(frame, there[1:3])
+        run.frame(there, time=numpy.nan if frame == 5 else frame, groups=[[0, 1], [1, 2]],
+                  blade=numpy.full((1, 4, 3), 1e200 if frame == 2 else numpy.inf))
+path, document = page_of("<!--<script>", 1)
+with Browser(path) as page:
+    assert page.driver.title.startswith("Fails: <!--<script>.h5"), page.driver.title
+    for frame in range(6):
+        page.scrub(frame)
+        assert page.data(f"moments[{frame}].swept") == []
+
 # --- A page stays small, and says what it leaves out ---
 
 x = numpy.stack(numpy.meshgrid(*3 * [numpy.arange(20.0)], indexing="ij"), 3).reshape(-1, 3) * 0.01
