@@ -29,6 +29,7 @@ LONG = (
     (r"Program\.LetsTheRestOfTheKidneyEndWithTheSameBits.*", "a ghost force by the bits of a whole scene"),
     (r"Report\.(InABrowser|ScenesInABrowser|HowFast|OfStoredResults)", "what a page draws, what a click does, its pace"),
     (r"(PythonWithCudaStandIn\.Arrays|SciPy\.Judged)", "answers in a device's memory; a library that stops to hold"),
+    (r"Runs\.DissectedWithFaults", "a fault of a simulator that no drawn scene shows, or that is not shrunk"),
     (r"(Vectors\.ThatThePageAnswersHold|Tutorial\.FromAFailingCutToTheFix)", "programs of a page that no longer run"),
     (r"(BenchSensitivity|BenchSampling)\.HasARowForEach.*|BenchBaselines\.TellsOfEveryMethodWhatItCosts"
      r"|Bench\.ReproducesTable1.*", "a row of a suite that is missing or wrong"),

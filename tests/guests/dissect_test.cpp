@@ -99,6 +99,22 @@ TEST(Dissect, AFailureIsShrunkSavedAndFailsAgain) {
   }
 }
 
+TEST(Dissect, ASimplerSceneLeavesOutAStrokeAndKeepsTheOther) {
+  const Question two = dissect().draw_for(3, 5, with_limits(""));
+  ASSERT_EQ(given(two, "blades").integer(0), 2);
+  const auto both = given(two, "blade").of<double>();
+  for (const std::size_t gone : {0u, 1u}) {
+    const Question one = dissect().simpler(two)[gone];
+    EXPECT_EQ(given(one, "blades").integer(0), 1);
+    const auto left = given(one, "blade").of<double>();
+    ASSERT_EQ(2 * left.size(), both.size());
+    for (std::size_t k = 0; k < left.size(); ++k) {
+      const double wanted = both[24 * (k / 12) + 12 * (1 - gone) + k % 12];
+      EXPECT_TRUE(left[k] == wanted || (std::isnan(left[k]) && std::isnan(wanted))) << k;
+    }
+  }
+}
+
 TEST(Dissect, TellsWhereTwoRunsPart) {
   const KernelCampaign campaign = judged("last_bit", {.cases = 10, .simplify = 0});
   ASSERT_FALSE(campaign.failures.empty());

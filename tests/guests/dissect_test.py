@@ -1,9 +1,9 @@
 """The simulators of guests/examples/runs/, asked by `dissect`: right ones hold in drawn scenes, and each fault fails the
 property that is named here. CUTPROOF names the program.
 
-Usage: dissect_test.py            right simulators in 50 scenes, and what a function may do wrong
+Usage: dissect_test.py            right simulators in 50 scenes, or 1,000 (ci/nightly.sh), and what a function may do
+                                  wrong
        dissect_test.py faults     every fault is found in few scenes, and shrunk
-       dissect_test.py all N      right simulators in N scenes
 """
 import importlib
 import os
@@ -67,24 +67,19 @@ class Dissected(unittest.TestCase):
             str(caught.exception)
 
 
-def right_simulators_hold(self, cases):
-    print(f"seed {SEED}, {cases} scenes each", file=sys.stderr)
-    for name in LIMITS:
-        with self.subTest(name):
-            result = self.of_gallery(name, cases=cases)
-            print(result.text.splitlines()[1], file=sys.stderr)
-            operation = result.operations["dissect"]
-            self.assertEqual((operation["cases"], operation["refused"]), (cases, 0))
-            judged = {each["property"]: each["judged"] for each in operation["properties"]}
-            for wanted in (ACROSS, WITHIN, "linear momentum", "angular momentum", "determinism", "cut as drawn"):
-                self.assertGreater(judged[wanted], cases // 5, wanted)
-            for kind in operation["kinds"]:
-                self.assertGreater(kind["as_drawn"], 0, kind)
-
-
 class RightSimulators(Dissected):
-    def test_hold_in_50_scenes(self):
-        right_simulators_hold(self, 50)
+    def test_hold_in_drawn_scenes(self):
+        cases = 1000 if os.environ.get("CUTPROOF_WHOLE") else 50
+        print(f"seed {SEED}, {cases} scenes each", file=sys.stderr)
+        for name in LIMITS:
+            with self.subTest(name):
+                operation = self.of_gallery(name, cases=cases).operations["dissect"]
+                self.assertEqual((operation["cases"], operation["refused"]), (cases, 0))
+                judged = {each["property"]: each["judged"] for each in operation["properties"]}
+                for wanted in (ACROSS, WITHIN, "linear momentum", "angular momentum", "determinism", "cut as drawn"):
+                    self.assertGreater(judged[wanted], cases // 5, wanted)
+                for kind in operation["kinds"]:
+                    self.assertGreater(kind["as_drawn"], 0, kind)
 
 
 class Functions(Dissected):
@@ -157,7 +152,7 @@ class Faults(Dissected):
         for fault, by_simulator in FAULTS.items():
             for name, wanted in by_simulator.items():
                 with self.subTest(fault=fault, simulator=name):
-                    failures, text = self.failures(name, fault, cases=40, simplify=10)
+                    failures, text = self.failures(name, fault, cases=20, simplify=10)
                     self.assertIn(wanted, failures, text)
                     found = failures[wanted]
                     print(f"{name} {fault}: '{wanted}' in question {found['index']}, {found['size']}", file=sys.stderr)
@@ -181,8 +176,5 @@ class Faults(Dissected):
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["all"]:
-        RightSimulators.test_hold = lambda self: right_simulators_hold(self, int(sys.argv[2]))
-        unittest.main(argv=sys.argv[:1], defaultTest="RightSimulators.test_hold", verbosity=2)
     unittest.main(argv=sys.argv[:1], verbosity=2,
                   defaultTest=["Faults"] if sys.argv[1:] == ["faults"] else ["RightSimulators", "Functions"])
