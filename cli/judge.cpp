@@ -137,8 +137,19 @@ void print_kinds(const KernelCampaign& campaign) {
   if (right > 0) say("  nothing is wrong in {}\n", counted(right, "other kind", "other kinds"));
 }
 
+// Of a simulator: what was tested.
+void print_scenes(const KernelCampaign& campaign) {
+  Table table({"kind", "scenes", "refused", "cut as drawn"});
+  for (const KindSummary& kind : campaign.kinds) {
+    table.add(
+        {printable(kind.kind), io::grouped(kind.questions), io::grouped(kind.refused), io::grouped(kind.as_drawn)});
+  }
+  say_as_it_is(table.text());
+}
+
 void print_properties(const KernelCampaign& campaign) {
   print_judged(campaign.properties, &harness::PropertySummary::judged);
+  if (campaign.operation->is_simulator()) print_scenes(campaign);
   print_kinds(campaign);
   for (const Unpromised& u : campaign.unpromised) {
     say("  {}: {}{}\n", undecided("not promised, not judged"), u.property,
