@@ -423,8 +423,8 @@ class RunJudge::Implementation {
                          (header_.promised(RunPromise::free) ? 0 : sweep_reach(frame)) + header_.cut_resolution;
     for (std::size_t i = 0; i < was_.size(); ++i) {
       if (exists_[i] == 0 || existed_[i] == 0 || (!frame.held.empty() && frame.held[i] != 0)) continue;
-      const Vec3 mean = 0.5 * (frame.velocities[i] + velocity_was_[i]);
-      const double off = norm(frame.positions[i] - was_[i] - dt * mean);
+      const Vec3 way = (0.5 * dt) * (frame.velocities[i] + velocity_was_[i]);
+      const double off = norm(frame.positions[i] - was_[i] - way);
       if (!within(kTeleport, off, bound))
         fail(kTeleport, {{}, {static_cast<int32_t>(i)}},
              "particle {} is {:.3g} m from where its velocity takes it in frame {}; no velocity is farther than {:.3g} "
