@@ -10,7 +10,7 @@ import scene
 import cutproof_run
 
 FAULTS = ("heals stale_index glued_by_one_node spin_lost units mirror reset teleport tear_elsewhere fragment "
-          "inverted momentum_from_nothing global_solver race noise").split()
+          "inverted volume momentum_from_nothing global_solver race noise").split()
 kept = {}
 
 
@@ -44,7 +44,7 @@ def simulate(body, blade, frames, fault=None):
     pairs = np.array([(a, b) for a in range(len(cells)) for b in range(a + 1, len(cells))
                       if len(set(cells[a]) & set(cells[b])) == 3])
     broken, split_so_far, first_cells = np.zeros(len(pairs), bool), 0, cells
-    held = body.get("held", np.zeros(len(rest), bool))
+    held, lost = body.get("held", np.zeros(len(rest), bool)), np.zeros(len(cells), bool)
     if fault == "reset":  # the last body's cuts are still there
         broken = kept.setdefault("broken", broken)
     for frame in range(frames):
@@ -83,6 +83,9 @@ def simulate(body, blade, frames, fault=None):
         if fault == "fragment" and hit.any():  # an index that nobody has set is 0
             hit |= (pairs == 0).any(1)
         broken |= hit
+        if fault == "volume":  # cells that the blade passes through are deleted
+            lost |= np.isin(np.arange(len(cells)), pairs[hit, 0])
+            volume = np.where(lost, 0, volume)
         if broken.sum() > split_so_far:
             split_so_far = broken.sum()
             cells, new = split(cells, pairs[~broken], len(x), fault)
@@ -92,8 +95,8 @@ def simulate(body, blade, frames, fault=None):
             mass = np.bincount(cells.ravel(), np.repeat(cell_mass, 4), len(x))
             if fault == "momentum_from_nothing":  # both sides get all of the mass
                 mass = np.append(old, old[new])
-        yield dict(positions=x, velocities=v, time=frame * body["frame_time"], cells=cells, mass=mass, parent=parent,
-                   blade=blade[frame])
+        yield dict(positions=x, velocities=v, time=frame * body["frame_time"], cells=cells[~lost], mass=mass,
+                   parent=parent, blade=blade[frame])
 
 
 if __name__ == "__main__":
