@@ -38,7 +38,7 @@ inline constexpr Promises kPromisesOfRules = {.coupling_without_edge_cover = fal
                                               .maximality_after_expansion = false};
 
 // Words separated by spaces, as bits; "*": all. Throws InputError, naming `file` and `field`, for a word that there is
-// not, and names those that there are. Those of runs (oracles/runs/run.h) have no bit.
+// not, and names those that there are. Words of runs alone (oracles/runs/run.h) have no bit.
 uint32_t parse_promises(std::string_view text, const std::string& file, const std::string& field);
 
 }  // namespace cutproof::harness
