@@ -111,7 +111,8 @@ class WrittenInC(unittest.TestCase):
 
         n = 5
         given = {"rest": of("f4", n, 3), "gravity": of("f8", 3), "spacing": of("f8"), "steps": of("i8"),
-                 "damping": of("f4"), "edges": of("i4", 4, 2), "nodes": of("i8", n, 3), "cut_resolution": of("f8"),
+                 "damping": of("f4"), "edges": of("i4", 4, 2), "nodes": of("i8", n, 3),
+                 "permutation": of("i4", n), "cut_resolution": of("f8"),
                  "unit_roundoff": of("f8"), "positions": of("f8", n, 3), "time": of("f8"),
                  "velocities": of("f4", n, 3), "alive": of("u1", n), "removed": of("i4", n), "held": of("i8", n),
                  "contact_impulse": of("f4", 3), "spin": of("f8", n, 3), "energy": of("f4"),
@@ -119,7 +120,7 @@ class WrittenInC(unittest.TestCase):
                  "groups_weights": of("f4", 300), "cells": of("i4", 0, 8), "mass": of("f8", n), "parent": of("i4", n),
                  "piece": of("i8", n), "vertices": of("f4", 6, 3), "triangles": of("i4", 7, 3)}
         by_frame = {"positions", "time", "velocities", "alive", "removed", "held", "contact_impulse", "spin", "energy",
-                    "blade"}
+                    "blade", "vertices"}
         names = [self.library.run_name(k).decode() for k in range(len(given) + 1)]
         self.assertEqual(set(names), {*given, "promises"})
         self.assertIsNone(self.library.run_name(len(names)))

@@ -79,7 +79,7 @@ static const cutproof_run_array cutproof_run_arrays[] = {
     {"mass", 's', 'r', 'n', 1, 0},            /* [kg] */
     {"parent", 's', 'w', 'n', 1, 0},          /* which particle a new one was split from; -1: none */
     {"piece", 's', 'w', 'n', 1, 0},           /* your own word on which piece a particle is of */
-    {"vertices", 's', 'r', '*', 3, 0},        /* [m] of the skin */
+    {"vertices", 'f', 'r', '*', 3, 0},        /* [m] of the skin */
     {"triangles", 's', 'w', '*', 3, 0},       /* of the skin */
     {"promises", 'o', 't', '1', 1, 0},        /* text: cutproof_run_promise() */
 };
