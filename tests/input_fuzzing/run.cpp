@@ -86,7 +86,7 @@ SmallRun cells() {
   add(run[1], "blade", {1, 1, 3, 3}, std::vector<float>{-9, -9, 0, 9, -9, 0, 0, 9, 0});
   add(run[1], "parent", {8}, std::vector<int32_t>{-1, -1, -1, -1, -1, 1, 2, 3});
   add(run[1], "mass", {8}, std::vector<float>{1, 0.5, 0.5, 0.5, 1, 0.5, 0.5, 0.5});
-  add(run[2], "vertices", {3, 3}, std::vector<float>(9, 0));
+  add(run[2], "vertices", {1, 3, 3}, std::vector<float>(9, 0));
   add(run[2], "triangles", {1, 3}, std::vector<int32_t>{0, 1, 2});
   add(run[0], "rest", {5, 3}, corners);
   add(run[0], "mass", {5}, std::vector<float>(5, 1));
