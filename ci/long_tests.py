@@ -33,7 +33,6 @@ LONG = (
     (r"(Vectors\.ThatThePageAnswersHold|Tutorial\.FromAFailingCutToTheFix)", "programs of a page that no longer run"),
     (r"(BenchSensitivity|BenchSampling)\.HasARowForEach.*|BenchBaselines\.TellsOfEveryMethodWhatItCosts"
      r"|Bench\.ReproducesTable1.*", "a row of a suite that is missing or wrong"),
-    (r"Runs\.DissectedWithFaults", "a fault of a simulator that dissect does not find, or does not simplify"),
     (r"Skin\.LiesOnTheSurfaceOfAnUncutBody", "a skin that reference, kernels and oracles all have off the surface"),
     (r"Screen\.(IsNotLeftByAnyVerb|OnATerminal)", "a line that is too long in what a whole campaign or suite prints"),
     (r"Interrupted\.(TuneWritesWhatItHasTried|EverySuiteOfBenchWritesItsDocumentHoweverEarly)",
