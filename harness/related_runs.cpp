@@ -82,8 +82,7 @@ class Together {
       append(positions_, one.frame.positions), append(velocities_, one.frame.velocities);
       append(spin_, one.frame.spin), append(blade_, one.frame.blade);
       for (std::size_t i = 0; i < one.frame.positions.size(); ++i) {
-        exists_.push_back((one.frame.alive.empty() || one.frame.alive[i] != 0) &&
-                          (one.frame.removed.empty() || one.frame.removed[i] == 0));
+        exists_.push_back(oracles::exists(one.frame, i));
       }
       all.is_new_coupling = all.is_new_coupling || one.is_new_coupling;
       is_coupled = is_coupled && one.coupling != nullptr;

@@ -25,13 +25,8 @@ void RunSkin::see(const RunFrames& frames, const oracles::RunJudge& judge) {
   if (!skin) return;
   const bool is_finite_all = std::ranges::all_of(skin->position, [](Vec3 x) { return is_finite(x); });
   if (!frames.has_new_triangles() && frame.blade.empty() && is_finite_all) return;
-  const auto is_there = [&](std::size_t i) {
-    const Vec3 x = frame.positions[i];
-    return !std::isnan(x.x + x.y + x.z) && (frame.alive.empty() || frame.alive[i] != 0) &&
-           (frame.removed.empty() || frame.removed[i] == 0);
-  };
   bool any_alive = false;
-  for (std::size_t i = 0; i < frame.positions.size() && !any_alive; ++i) any_alive = is_there(i);
+  for (std::size_t i = 0; i < frame.positions.size() && !any_alive; ++i) any_alive = oracles::exists(frame, i);
   const Verdict surface = closed_skin(*skin, any_alive);
   const bool is_surface = surface.holds;
   take(surface_, surface, frame.index);

@@ -66,4 +66,10 @@ struct RunFrame {
   std::optional<double> energy;                   // [J]
 };
 
+// Whether particle i exists in the frame.
+inline bool exists(const RunFrame& frame, std::size_t i) {
+  return i < frame.positions.size() && !is_blank(frame.positions[i]) && (frame.alive.empty() || frame.alive[i] != 0) &&
+         (frame.removed.empty() || frame.removed[i] == 0);
+}
+
 }  // namespace cutproof::oracles

@@ -303,13 +303,8 @@ class RunJudge::Implementation {
   }
 
   void find_existing(const RunFrame& frame) {
-    exists_.assign(at(n_), 1);
-    for (std::size_t i = 0; i < exists_.size(); ++i) {
-      if (is_blank(frame.positions[i]) || (!frame.alive.empty() && frame.alive[i] == 0) ||
-          (!frame.removed.empty() && frame.removed[i] != 0)) {
-        exists_[i] = 0;
-      }
-    }
+    exists_.resize(at(n_));
+    for (std::size_t i = 0; i < exists_.size(); ++i) exists_[i] = exists(frame, i);
     ever_.resize(exists_.size());
     int64_t revived = 0;
     for (std::size_t i = 0; i < exists_.size(); ++i) {

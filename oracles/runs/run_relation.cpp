@@ -61,10 +61,6 @@ Verdict fresh(Which which) {
   return verdict;
 }
 
-bool exists(const RunFrame& frame, std::size_t i) {
-  return i < frame.positions.size() && !is_blank(frame.positions[i]) && (frame.alive.empty() || frame.alive[i] != 0) &&
-         (frame.removed.empty() || frame.removed[i] == 0);
-}
 // Infinite where one of the two is no number.
 double distance(Vec3 a, Vec3 b) {
   const double length = std::hypot(a.x - b.x, a.y - b.y, a.z - b.z);
