@@ -172,7 +172,7 @@ int kick(const KickOptions& options) {
   const oracles::KickReport report = oracles::judge_kick(kick.runs);
   const std::vector<Verdict> verdicts = report.all();
   write_document(options.json, to_json(options, kick, report));
-  const Judging judging{"cutproof kick", "cutproof.kick", options.again};
+  const Judging judging{"cutproof kick", "cutproof.kick", options.again, Judging::Of::state};
   write_junit(options.junit, judging, 0, cases_of(verdicts, judging), shares_of(report));
   say("kick {}: {} frames of {} particles{}\n", options.file, kick.runs.frames, kick.runs.particles,
       kick.runs.kicks.size() > 1 ? fmt::format(", {} kicks", kick.runs.kicks.size()) : "");

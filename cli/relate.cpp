@@ -136,7 +136,7 @@ int relate(const RelateOptions& options) {
   }();
   const std::vector<std::string> notes = notes_of(judged, !options.noise.empty());
   write_document(options.json, to_json(options, judged, notes));
-  const Judging judging{"cutproof relate", "cutproof.relate." + map.name(), options.again};
+  const Judging judging{"cutproof relate", "cutproof.relate." + map.name(), options.again, Judging::Of::frames};
   write_junit(options.junit, judging, 0, cases_of(judged.verdicts, judging));
   say("relate {}: {} frames of {} particles\n", options.map, judged.frames, judged.particles);
   Shown shown{options.again};

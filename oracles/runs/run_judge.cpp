@@ -673,8 +673,8 @@ class RunJudge::Implementation {
       } else if (known->second != piece) {
         ++across;
         fail(kAcross, {{}, {unit_particle(unit_of[component]), unit_particle(unit)}},
-             "particles {} and {} are coupled in frame {}, and the blade has parted them",
-             unit_particle(unit_of[component]), unit_particle(unit), frame_);
+             "particles {} and {} are coupled in frame {}, and {}", unit_particle(unit_of[component]),
+             unit_particle(unit), frame_, has_blade_ ? "the blade has parted them" : "no tissue joins them");
       }
     }
     within(kAcross, static_cast<double>(across), 0);

@@ -131,6 +131,10 @@ class Runs(JudgedRuns):
                 status, document, text = self.related("springs", word, "--fault", fault, bits=wanted == "same bits")
                 self.assertEqual(status, 1, text)
                 self.assertIn(wanted, self.failed(document), text)
+                report = self.folder / "related.xml"
+                self.relate(self.folder / "first.h5", self.folder / "second.h5", "--map", word, "--junit", report)
+                names = [case.get("name") for case in ElementTree.parse(report).iter("testcase")]
+                self.assertIn("related positions", names)
         # A right run beside one whose square roots are of single precision: as a GPU beside its CPU.
         right = self.simulate("springs", "first.h5", "--frames", "12")
         rough = self.simulate("springs", "second.h5", "--frames", "12", "--fault", "noise")
