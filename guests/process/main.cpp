@@ -299,8 +299,8 @@ cutproof_scene scene(const cutproof_tissue& tissue) {
   return s;
 }
 
-cutproof_run run() {
-  cutproof_run r = {};
+cutproof_frames run() {
+  cutproof_frames r = {};
   r.size = sizeof r;
   r.steps = call.shown("run/steps");
   r.damping = call.shown("run/damping");
@@ -359,7 +359,7 @@ int ask(void* self) {
       return plugin->run(&host, self, call.request.first, call.request.last, &s);
     case wire::dissect: {
       const cutproof_scene asked = scene(t);
-      cutproof_run r = run();
+      cutproof_frames r = run();
       return plugin->dissect(&host, self, &asked, &r);
     }
     default:

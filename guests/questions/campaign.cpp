@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "guests/questions/kinds.h"
+#include "guests/questions/scenes.h"
 #include "guests/tissue_arrays.h"
 #include "model/at.h"
 #include "model/error.h"
@@ -152,7 +153,7 @@ std::string KernelCampaign::untested() const {
   if (answered * 10 < questions) return fmt::format("{} of {} questions were refused", refused, questions);
   int64_t cut = 0;
   for (const KindSummary& kind : kinds) {
-    cut += kind.as_drawn;
+    cut += scenes::is_to_be_cut(kind.kind) ? kind.as_drawn : 0;
     if (kind.as_drawn == 0 && kind.questions - kind.refused >= kEnoughToBeOne) {
       return fmt::format("none of {} scenes of the kind '{}' was one", kind.questions - kind.refused, kind.kind);
     }

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <functional>
 #include <utility>
@@ -12,19 +13,14 @@
 #include "harness/foreign_run.h"
 #include "model/at.h"
 #include "model/error.h"
+#include "model/words.h"
 #include "oracles/runs/run.h"
 
 namespace cutproof::guests {
 
 bool is_promised(std::string_view words, oracles::RunPromise promise) {
   const std::string_view wanted = oracles::kRunPromises[at(static_cast<int>(promise))];
-  for (std::size_t begin = 0; begin < words.size();) {
-    const std::size_t end = std::min(words.find(' ', begin), words.size());
-    const std::string_view word = words.substr(begin, end - begin);
-    if (word == wanted || word == "*") return true;
-    begin = end + 1;
-  }
-  return false;
+  return std::ranges::any_of(words_in(words), [&](std::string_view word) { return word == wanted || word == "*"; });
 }
 
 namespace {
@@ -47,8 +43,8 @@ class Greatest {
   }
   void see(double measured, int64_t particle, int64_t frame, const char* text) {
     ++verdict_.checked;
-    const bool is_worse = !(measured <= verdict_.measured);
-    if (is_worse) verdict_.measured = measured;
+    // Nothing is worse than what is no number.
+    if (!std::isnan(verdict_.measured) && !(measured <= verdict_.measured)) verdict_.measured = measured;
     if (measured <= verdict_.bound || !verdict_.holds) return;
     verdict_.holds = false;
     verdict_.frame = frame;
@@ -62,7 +58,7 @@ class Greatest {
   Verdict verdict_;
 };
 
-// It begins where it was told to, and what is held stays. `run`: of run_files().
+// It begins where it was told to, and what is held stays while it exists. `run`: of run_files().
 std::vector<Verdict> judge_as_asked(const Scene& scene, const std::vector<io::ArrayFile>& run, double u) {
   const auto of = [&](std::size_t frame, const char* name) {
     const Array* const array = find_array(run[frame].arrays, name);
@@ -86,8 +82,11 @@ std::vector<Verdict> judge_as_asked(const Scene& scene, const std::vector<io::Ar
   }
   for (std::size_t f = 0; f < run.size(); ++f) {
     const std::vector<Vec3> now = of(f, "positions");
+    const Array* const alive = find_array(run[f].arrays, "alive");
     for (std::size_t i = 0; i < std::min(now.size(), scene.held.size()); ++i) {
-      if (scene.held[i] == 0) continue;
+      const bool is_gone =
+          oracles::is_blank(now[i]) || (alive != nullptr && alive->integer(static_cast<int64_t>(i)) == 0);
+      if (scene.held[i] == 0 || is_gone) continue;
       held.see(norm(now[i] - start[i]), static_cast<int64_t>(i), static_cast<int64_t>(f), "is held, and has moved");
     }
   }
@@ -126,6 +125,7 @@ std::vector<Verdict> judge_scene(const Question& question, const Arrays& answers
 }
 
 std::string difference_of_runs(const Question& question, const Arrays& one, const Arrays& other) {
+  if (!run_files(question, one, Precision::binary64).problem.empty()) return "";  // a verdict by itself
   const Array &a = *find_array(one, "run/position"), &b = *find_array(other, "run/position");
   const Array& particles = *find_array(one, "run/particles");
   const Scene scene = scene_of(question.given);
@@ -195,7 +195,8 @@ std::vector<Question> simpler_scenes(const Question& question) {
   const auto add = [&](const Scene& other) {
     Question next = question;
     next.given = arrays_of(other);
-    if (other.count() > 0 && !(next == question)) simpler.push_back(std::move(next));
+    if (other.count() > 0 && !(next == question) && (simpler.empty() || !(next == simpler.back())))
+      simpler.push_back(std::move(next));
   };
   // Without a stroke.
   for (int64_t gone = 0; gone < scene.blades && scene.blades > 1; ++gone) {

@@ -247,6 +247,8 @@ void add_strokes(Scene& scene, Vec3 common, const std::vector<SceneStroke>& stro
 
 // --- Kinds -----------------------------------------------------------------------------------------------------------
 
+constexpr const char *kAlongTheGrid = "along the grid", *kBesideTheTissue = "beside the tissue";
+
 // What the judge of runs found of the tissue, beside what the blade was to do.
 struct SceneKind {
   const char* name;
@@ -318,7 +320,7 @@ const SceneKind kSceneKinds[] = {
        return two_strokes(r, scene, limits.one_blade > 0, a, b);
      },
      has_two_more_pieces},
-    {"along the grid",  // through the particles of a layer, or in the middle between two
+    {kAlongTheGrid,  // through the particles of a layer, or in the middle between two
      [](Random& r, const Scene& scene, const Limits&) {
        Plane plane = draw_plane(r, scene, false);
        plane.offset = std::floor(plane.offset) + 0.5 * r.below(3);
@@ -356,7 +358,7 @@ const SceneKind kSceneKinds[] = {
                                        {back, 1 + first, way_through(scene, back, second, to)}};
      },
      is_surely_cut},
-    {"beside the tissue",
+    {kBesideTheTissue,
      [](Random& r, const Scene& scene, const Limits& limits) {
        Plane plane = draw_plane(r, scene, true);
        plane.offset = range_along(scene, plane.normal).high + 1.5 + limits.cut_resolution + r.unit();
@@ -373,6 +375,7 @@ bool is_as_drawn(const std::string& kind, const oracles::RunPieces& pieces) {
       std::find_if(std::begin(kSceneKinds), std::end(kSceneKinds), [&](const SceneKind& k) { return kind == k.name; });
   return known != std::end(kSceneKinds) && known->is_one(pieces);
 }
+bool is_to_be_cut(std::string_view kind) { return kind != kAlongTheGrid && kind != kBesideTheTissue; }
 
 std::vector<std::string> scene_kinds() {
   std::vector<std::string> names;

@@ -11,6 +11,7 @@
 #include "model/bare_graph.h"
 #include "model/counted.h"
 #include "model/error.h"
+#include "model/words.h"
 
 namespace cutproof::guests::scenes {
 
@@ -28,11 +29,7 @@ Limits limits_of(const std::string& words, const std::string& plugin) {
                                   {"diagonals", &Limits::diagonals, 0, 0},
                                   {"no_grips", &Limits::no_grips, 0, 0}};
   Limits limits;
-  for (std::size_t begin = 0; begin < words.size();) {
-    const std::size_t end = std::min(words.find(' ', begin), words.size());
-    const std::string_view word = std::string_view(words).substr(begin, end - begin);
-    begin = end + 1;
-    if (word.empty()) continue;
+  for (const std::string_view word : words_in(words)) {
     const auto refuse = [&](const std::string& problem) -> InputError {
       return {plugin, "limits", problem,
               "give words of these, separated by spaces: particles=N, gap=H, cut_resolution=H, one_blade, cells, "
@@ -163,7 +160,8 @@ std::string problem_of_scene(const Question& question) {
     }
   }
   const int64_t blades = find_array(arrays, "blades")->integer(0), swept = rows("blade");
-  if (swept == 0 || swept % blades != 0 || swept / blades > kMostFrames) return "'blade' has no rows for each frame";
+  if (swept == 0 || swept % blades != 0) return "'blade' has no rows for each frame";
+  if (swept / blades > kMostFrames) return fmt::format("'blade' has more than {} frames", kMostFrames);
   for (const char* const name : {"rest", "mass", "velocity", "gravity"}) {
     const auto numbers = find_array(arrays, name)->of<double>();
     if (!std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); }))

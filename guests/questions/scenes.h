@@ -61,6 +61,8 @@ Question draw_scene(uint64_t seed, int64_t index, Precision precision);
 Question draw_scene_for(uint64_t seed, int64_t index, const PluginInfo& plugin);
 // Whether the judge found the tissue cut as this kind says.
 bool is_as_drawn(const std::string& kind, const oracles::RunPieces& pieces);
+// Whether scenes of this kind are one only if tissue is surely cut.
+bool is_to_be_cut(std::string_view kind);
 
 inline constexpr AnswerArray kRunAnswers[] = {
     {.name = "run/steps", .type = ElementType::i64, .text = "[1] substeps in a frame"},

@@ -150,7 +150,7 @@ TEST(Dissect, AKindOfWhichNoSceneIsOneIsNotTested) {
   EXPECT_EQ(campaign.untested(), "none of 10 scenes of the kind 'curved cut' was one");
   campaign.kinds.back().as_drawn = 1;
   EXPECT_TRUE(campaign.holds());
-  campaign.kinds = {kind("cut through", 9, 0)};
+  campaign.kinds = {kind("cut through", 9, 0), kind("beside the tissue", 9, 9), kind("along the grid", 9, 9)};
   EXPECT_EQ(campaign.untested(), "in none of 30 scenes was the tissue cut as drawn");
 }
 

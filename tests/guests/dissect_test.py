@@ -70,7 +70,6 @@ class Dissected(unittest.TestCase):
 class RightSimulators(Dissected):
     def test_hold_in_drawn_scenes(self):
         cases = 1000 if os.environ.get("CUTPROOF_WHOLE") else 50
-        print(f"seed {SEED}, {cases} scenes each", file=sys.stderr)
         for name in LIMITS:
             with self.subTest(name):
                 operation = self.of_gallery(name, cases=cases).operations["dissect"]
@@ -176,5 +175,6 @@ class Faults(Dissected):
 
 
 if __name__ == "__main__":
+    print(f"seed {SEED}", file=sys.stderr)
     unittest.main(argv=sys.argv[:1], verbosity=2,
                   defaultTest=["Faults"] if sys.argv[1:] == ["faults"] else ["RightSimulators", "Functions"])

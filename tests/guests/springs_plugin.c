@@ -55,7 +55,7 @@ static int more(const cutproof_host* host, cutproof_array* output, int64_t rows,
   return host->grow(host, output, output->rows + rows);
 }
 
-static int write_frame(const cutproof_host* host, cutproof_run* run, int64_t n, const double* x, const double* v,
+static int write_frame(const cutproof_host* host, cutproof_frames* run, int64_t n, const double* x, const double* v,
                        const spring* springs, int64_t count) {
   int64_t begin, whole = 0, member = 0;
   if (more(host, run->position, n, &begin)) return 1;
@@ -79,7 +79,7 @@ static int write_frame(const cutproof_host* host, cutproof_run* run, int64_t n, 
   return 0;
 }
 
-static int simulate(const cutproof_host* host, const cutproof_scene* scene, cutproof_run* run, double* x, double* v,
+static int simulate(const cutproof_host* host, const cutproof_scene* scene, cutproof_frames* run, double* x, double* v,
                     double* force, spring* springs) {
   const int64_t n = scene->tissue->rest->rows;
   const int64_t* const offsets = (const int64_t*)scene->tissue->edge_offsets->data;
@@ -153,7 +153,7 @@ static int simulate(const cutproof_host* host, const cutproof_scene* scene, cutp
   return 0;
 }
 
-static int dissect(const cutproof_host* host, void* self, const cutproof_scene* scene, cutproof_run* run) {
+static int dissect(const cutproof_host* host, void* self, const cutproof_scene* scene, cutproof_frames* run) {
   (void)self;
   const int64_t n = scene->tissue->rest->rows;
   /* All but one scene in a hundred. */

@@ -27,7 +27,8 @@ void say(const char* name, long long value) {
 int main() {
   SAY(wire::kProtocol), SAY(wire::kPage), SAY(wire::kArrayBytes), SAY(wire::kArenaBytes), SAY(wire::kArenaCount);
   SAY(wire::kMemoryBytes), SAY(wire::kLeastGap), SAY(wire::kCanary), SAY(wire::kDeviceCanary), SAY(wire::kMostArrays);
-  SAY(wire::kMostGrown), SAY(wire::rotations), SAY(wire::components), SAY(wire::surface), SAY(wire::clusters), SAY(wire::dissect);
+  SAY(wire::kMostGrown), SAY(wire::rotations), SAY(wire::components), SAY(wire::surface), SAY(wire::clusters),
+      SAY(wire::dissect);
   SAY(wire::Role::given), SAY(wire::Role::answer), SAY(wire::Role::grown), SAY(wire::Role::setup);
   SAY(wire::Outcome::answered), SAY(wire::Outcome::refused), SAY(wire::Outcome::broke_a_rule);
   SAY(wire::Outcome::device_failed), SAY(wire::Greeting::ready);

@@ -67,7 +67,7 @@ typedef struct cutproof_scene { /* a body at rest, and what becomes of it; n par
   const cutproof_array* blade;
 } cutproof_scene;
 
-typedef struct cutproof_run { /* docs/reference/run.md; p: particles of all frames, one frame after the other */
+typedef struct cutproof_frames { /* docs/reference/run.md; p: particles of all frames, one frame after the other */
   uint32_t size;
   /* Without rows: not given. All but position may be. */
   cutproof_array *steps, *damping;                     /* i64 [1] substeps in a frame; real [1] 1/s */
@@ -78,7 +78,7 @@ typedef struct cutproof_run { /* docs/reference/run.md; p: particles of all fram
   cutproof_array* group_count;                         /* i32 [frames] coupling groups; -1: as in the frame before */
   cutproof_array *offsets, *members, *weights;         /* of all that are given: i64 [groups + 1], i32, real */
   cutproof_array *cell_count, *tetrahedra, *hexahedra; /* i32 [frames], -1 likewise; i32 [.. x 4] or [.. x 8] */
-} cutproof_run;
+} cutproof_frames;
 
 typedef struct cutproof_host {
   uint32_t size;
@@ -125,7 +125,7 @@ typedef struct cutproof_plugin {
 
   /* A whole simulator. `limits`: words of docs/reference/plugins.md that say what it takes; null: all that is asked. */
   const char* limits;
-  int (*dissect)(const cutproof_host* host, void* self, const cutproof_scene* scene, cutproof_run* run);
+  int (*dissect)(const cutproof_host* host, void* self, const cutproof_scene* scene, cutproof_frames* run);
 } cutproof_plugin;
 
 #if defined(__GNUC__)
