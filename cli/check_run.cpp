@@ -39,8 +39,6 @@ std::string in_words(const oracles::RunPieces& pieces) {
 }
 
 nlohmann::json to_json(const std::string& file, const harness::JudgedRun& judged) {
-  nlohmann::json not_judged = nlohmann::json::array();
-  for (const auto& each : judged.not_judged) not_judged.push_back({{"property", each.property}, {"why", each.why}});
   const auto failed =
       std::count_if(judged.verdicts.begin(), judged.verdicts.end(), [](const Verdict& v) { return !v.holds; });
   const oracles::RunPieces& pieces = judged.pieces;
@@ -67,7 +65,7 @@ nlohmann::json to_json(const std::string& file, const harness::JudgedRun& judged
           {"arrays", judged.given},
           {"single_precision", judged.single_precision},
           {"verdicts", io::verdicts_json(judged.verdicts)},
-          {"not_judged", not_judged},
+          {"not_judged", not_judged_json(judged.not_judged)},
           {"summary", {{"holds", judged.holds()}, {"verdicts", judged.verdicts.size()}, {"failed", failed}}},
           {"notes", judged.notes}};
 }

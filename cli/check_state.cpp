@@ -20,12 +20,9 @@ namespace {
 
 nlohmann::json to_json(const std::string& file, const harness::ForeignState& foreign,
                        const harness::ForeignVerdicts& judged) {
-  nlohmann::json promises = nlohmann::json::array(), not_judged = nlohmann::json::array();
+  nlohmann::json promises = nlohmann::json::array();
   for (std::size_t k = 0; k < harness::promise_words().size(); ++k) {
     if ((foreign.promises.words >> k & 1u) != 0) promises.push_back(harness::promise_words()[k].name);
-  }
-  for (const harness::NotJudged& each : judged.not_judged) {
-    not_judged.push_back({{"property", each.property}, {"why", each.why}});
   }
   const auto failed = std::count_if(judged.verdicts.begin(), judged.verdicts.end(),
                                     [](const Verdict& verdict) { return !verdict.holds; });
@@ -46,16 +43,22 @@ nlohmann::json to_json(const std::string& file, const harness::ForeignState& for
           {"promises_given", foreign.promises_given},
           {"single_precision", foreign.state.precision == Precision::binary32},
           {"verdicts", io::verdicts_json(judged.verdicts)},
-          {"not_judged", not_judged},
+          {"not_judged", not_judged_json(judged.not_judged)},
           {"summary", {{"holds", judged.holds()}, {"verdicts", judged.verdicts.size()}, {"failed", failed}}},
           {"notes", judged.notes}};
 }
 
 }  // namespace
 
+nlohmann::json not_judged_json(const std::vector<harness::NotJudged>& not_judged) {
+  nlohmann::json all = nlohmann::json::array();
+  for (const harness::NotJudged& each : not_judged) all.push_back({{"property", each.property}, {"why", each.why}});
+  return all;
+}
+
 void show_judged(const std::vector<Verdict>& verdicts, const std::vector<harness::NotJudged>& not_judged,
                  const std::vector<std::string>& notes, const Shown& shown, const Judging& judging,
-                 const StateReports& reports) {
+                 const StateReports& reports, const std::vector<std::pair<std::string, std::string>>& properties) {
   std::vector<io::JunitCase> cases = cases_of(verdicts, judging);
   std::vector<std::pair<std::string, std::string>> others;
   for (const harness::NotJudged& each : not_judged) {
@@ -63,7 +66,7 @@ void show_judged(const std::vector<Verdict>& verdicts, const std::vector<harness
     cases.push_back({each.property, judging.class_name, 0, io::JunitOutcome::skipped, "not judged: " + each.why});
   }
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - reports.begun;
-  write_junit(reports.junit, judging, seconds.count(), std::move(cases));
+  write_junit(reports.junit, judging, seconds.count(), std::move(cases), properties);
   print_verdicts(verdicts, shown);
   print_grouped(undecided("Not judged"), others);
   print_notes(notes);

@@ -1,6 +1,7 @@
 // `cutproof check` of a file of arrays: one state that somebody else's simulator wrote.
 #pragma once
 #include <chrono>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -17,10 +18,13 @@ struct StateReports {
   std::chrono::steady_clock::time_point begun = std::chrono::steady_clock::now();
 };
 
-// Of a file that was judged: writes JUnit, prints the verdicts and what was not judged.
+nlohmann::json not_judged_json(const std::vector<harness::NotJudged>& not_judged);
+
+// Of a file that was judged: writes JUnit, with properties of the whole, and prints the verdicts and what was not
+// judged.
 void show_judged(const std::vector<Verdict>& verdicts, const std::vector<harness::NotJudged>& not_judged,
                  const std::vector<std::string>& notes, const Shown& shown, const Judging& judging,
-                 const StateReports& reports);
+                 const StateReports& reports, const std::vector<std::pair<std::string, std::string>>& properties = {});
 
 // Judges, prints, and writes what is asked for. `contents`: of the file. Returns the exit status.
 int check_state(const io::ArrayFile& contents, const std::string& file, const StateReports& reports);

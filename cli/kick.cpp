@@ -5,6 +5,7 @@
 #include <memory>
 #include <utility>
 
+#include "cli/check_state.h"
 #include "cli/commands.h"
 #include "cli/findings.h"
 #include "cli/options.h"
@@ -48,9 +49,8 @@ std::vector<std::string> notes_of(const oracles::KickReport& report, const harne
     notes.push_back(note + ".");
     if (report.judged_frames < runs.frames) {
       notes.push_back(
-          fmt::format("The noise of again begins late, and that of kicked may have begun at once: how far it would "
-                      "have grown is not "
-                      "known from frame {} on, and nothing was judged there.",
+          fmt::format("The noise of again begins late, and that of kicked may have begun at once. From frame {} on "
+                      "nobody knows how far it would have grown: nothing was judged there.",
                       report.judged_frames));
     }
   }
@@ -169,21 +169,17 @@ int kick(const KickOptions& options) {
   const harness::RecordedKick kick = harness::recorded_kick_of(io::read_array_file(options.file), options.file);
   require_writable(options.json);
   require_writable(options.junit);
+  const StateReports reports = {options.json, options.junit, "", options.again};
   const oracles::KickReport report = oracles::judge_kick(kick.runs);
   const std::vector<Verdict> verdicts = report.all();
   write_document(options.json, to_json(options, kick, report));
   const Judging judging{"cutproof kick", "cutproof.kick", options.again, Judging::Of::state};
-  write_junit(options.junit, judging, 0, cases_of(verdicts, judging), shares_of(report));
   say("kick {}: {} frames of {} particles{}\n", options.file, kick.runs.frames, kick.runs.particles,
       kick.runs.kicks.size() > 1 ? fmt::format(", {} kicks", kick.runs.kicks.size()) : "");
   print_pieces(kick, report);
   Shown shown{options.again};
   shown.in_frames = false;
-  print_verdicts(verdicts, shown);
-  print_notes(notes_of(report, kick));
-  print_written(options.json);
-  print_conclusion(verdicts, shown, "what was judged holds.");
-  print_annotations(failures_of(verdicts, judging));
+  show_judged(verdicts, {}, notes_of(report, kick), shown, judging, reports, shares_of(report));
   return report.holds() ? 0 : 1;
 }
 

@@ -2,9 +2,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
+#include <cstdlib>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "cli/check_state.h"
 #include "cli/commands.h"
 #include "cli/findings.h"
 #include "cli/options.h"
@@ -48,7 +51,8 @@ nlohmann::json to_json(const RelateOptions& options, const harness::JudgedRelati
                        const std::vector<std::string>& notes) {
   const auto failed =
       std::count_if(judged.verdicts.begin(), judged.verdicts.end(), [](const Verdict& v) { return !v.holds; });
-  nlohmann::json sharpest;
+  nlohmann::json sharpest, differences = nlohmann::json::array();
+  for (const double difference : judged.differences) differences.push_back(json_number(difference));
   if (judged.sharpest.frame >= 0) {
     sharpest = {{"frame", judged.sharpest.frame},
                 {"bound", json_number(judged.sharpest.bound)},
@@ -63,11 +67,14 @@ nlohmann::json to_json(const RelateOptions& options, const harness::JudgedRelati
           {"frames", judged.frames},
           {"particles", judged.particles},
           {"sharpest", sharpest},
-          {"differences", judged.differences},
+          {"differences", differences},
           {"verdicts", io::verdicts_json(judged.verdicts)},
+          {"not_judged", not_judged_json(judged.not_judged)},
           {"summary", {{"holds", judged.holds()}, {"verdicts", judged.verdicts.size()}, {"failed", failed}}},
           {"notes", notes}};
 }
+
+constexpr int kGreatestPower = 100;
 
 // "young=-1,-2,1", of a scalar, or "young=-1,-2,1,direction".
 std::pair<std::string, oracles::ArrayRule> rule_given(const std::string& text) {
@@ -80,10 +87,15 @@ std::pair<std::string, oracles::ArrayRule> rule_given(const std::string& text) {
   oracles::ArrayRule rule;
   rule.known = true;
   rule.how = oracles::Follows::scalar;
-  int powers[3] = {}, used = 0;
-  const std::string value = text.substr(equals + 1);
-  if (std::sscanf(value.c_str(), "%d,%d,%d%n", &powers[0], &powers[1], &powers[2], &used) != 3) wrong();
-  const std::string kind = value.substr(static_cast<std::size_t>(used));
+  int powers[3] = {};
+  std::string_view kind = std::string_view(text).substr(equals + 1);
+  for (int k = 0; k < 3; ++k) {
+    if (k > 0 && !kind.starts_with(',')) wrong();
+    const char* const begin = kind.data() + (k > 0 ? 1 : 0);
+    const auto [stop, error] = std::from_chars(begin, kind.data() + kind.size(), powers[k]);
+    if (error != std::errc{} || std::abs(powers[k]) > kGreatestPower) wrong();
+    kind.remove_prefix(static_cast<std::size_t>(stop - kind.data()));
+  }
   if (kind == ",point") {
     rule.how = oracles::Follows::point;
   } else if (kind == ",velocity") {
@@ -124,10 +136,14 @@ int relate(const RelateOptions& options) {
            map.name() == "refine"  ? "give the coarsest run first"
            : map.name() == "split" ? "give the run of all bodies first, then those of each alone"
                                    : "give the run and the one that corresponds");
-  if (options.bits && (!map.is_exact() || map.name() == "refine"))
-    refuse("--bits", fmt::format("'{}' rounds", options.map), "leave it out");
+  if (map.name() == "refine") {
+    if (options.bits) refuse("--bits", "runs with other substeps have other bits", "leave it out");
+    if (!options.noise.empty()) refuse("--noise", "'refine' compares with no noise", "leave it out");
+  }
+  if (options.bits && !map.is_exact()) refuse("--bits", fmt::format("'{}' rounds", options.map), "leave it out");
   require_writable(options.json);
   require_writable(options.junit);
+  const StateReports reports = {options.json, options.junit, "", options.again};
   const harness::RelatedFiles files = {
       options.files[0], {options.files.begin() + 1, options.files.end()}, options.noise, options.bits};
   const harness::JudgedRelation judged = [&] {
@@ -137,15 +153,10 @@ int relate(const RelateOptions& options) {
   const std::vector<std::string> notes = notes_of(judged, !options.noise.empty());
   write_document(options.json, to_json(options, judged, notes));
   const Judging judging{"cutproof relate", "cutproof.relate." + map.name(), options.again, Judging::Of::frames};
-  write_junit(options.junit, judging, 0, cases_of(judged.verdicts, judging));
   say("relate {}: {} frames of {} particles\n", options.map, judged.frames, judged.particles);
   Shown shown{options.again};
   shown.in_stages = false;
-  print_verdicts(judged.verdicts, shown);
-  print_notes(notes);
-  print_written(options.json);
-  print_conclusion(judged.verdicts, shown, "the runs correspond.");
-  print_annotations(failures_of(judged.verdicts, judging));
+  show_judged(judged.verdicts, judged.not_judged, notes, shown, judging, reports);
   return judged.holds() ? 0 : 1;
 }
 
@@ -159,14 +170,16 @@ void add_relate(CLI::App& program, Work& work) {
       ->type_name("RUN");
   auto* const map = command->add_option("--map", options->map, "how they correspond: same, units:4,1,1, mirror:x, …");
   map->type_name("WORD");
-  command->add_option("--make", options->make, "write the input that corresponds: of the first file, to the second")
-      ->type_name("WORD")
-      ->excludes(map);
+  auto* const make = command->add_option("--make", options->make,
+                                         "write the input that corresponds: of the first file, to the second");
+  make->type_name("WORD")->excludes(map);
   command->add_option("--noise", options->noise, "runs of the first, disturbed by one rounding in each frame")
-      ->type_name("RUN");
+      ->type_name("RUN")
+      ->excludes(make);
   command->add_option("--dimension", options->dimensions, "of an array of --make that cutproof does not know")
-      ->type_name("NAME=L,T,M");
-  command->add_flag("--bits", options->bits, "the bits must be the same, too");
+      ->type_name("NAME=L,T,M")
+      ->needs(make);
+  command->add_flag("--bits", options->bits, "the bits must be the same, too")->excludes(make);
   add_json(*command, options->json, "write verdicts");
   add_junit(*command, options->junit);
   command->callback([options, command, &work] {

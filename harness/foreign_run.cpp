@@ -26,7 +26,7 @@ JudgedRun judge_run(io::RunSegments segments,
     if (!judge) {
       judge.emplace(frames.header());
       judged.particles_at_start = segment.particles();
-      judged.single_precision = frames.precision() == Precision::binary32;
+      judged.single_precision = segment.precision() == Precision::binary32;
     }
     if (frames.begins_segment()) {
       for (const Array& array : segment.contents().arrays) judged.given.insert(array.name);

@@ -7,10 +7,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <tuple>
 
 #include "model/at.h"
+#include "model/bare_graph.h"
 #include "model/error.h"
 
 namespace cutproof::harness {
@@ -211,21 +211,14 @@ class Reader {
     } else if (a == b) {
       defect("an edge leads from particle {} to itself", a);
     } else {
-      edges_.insert(edges_.end(), {{a, b}, {b, a}});
+      edges_.emplace_back(a, b);
     }
   }
 
   void make_bare_graph() {
     Body& body = out_.setup.body;
-    std::sort(edges_.begin(), edges_.end());
-    edges_.erase(std::unique(edges_.begin(), edges_.end()), edges_.end());
     body.rest = rest_.empty() ? out_.state.x : rest_;
-    body.edge_offsets.assign(body.rest.size() + 1, 0);
-    for (const auto& [a, b] : edges_) {
-      ++body.edge_offsets[at(a) + 1];
-      body.edge_ends.push_back(b);
-    }
-    std::partial_sum(body.edge_offsets.begin(), body.edge_offsets.end(), body.edge_offsets.begin());
+    set_edges(body, edges_);
   }
 
   double longest_edge() const {
@@ -468,7 +461,7 @@ class Reader {
   NamedArrays in_;
   ForeignState out_;
   std::vector<Vec3> rest_;                          // as given, or as the nodes say; empty: neither
-  std::vector<std::pair<int32_t, int32_t>> edges_;  // at both ends
+  std::vector<std::pair<int32_t, int32_t>> edges_;
   std::string why_no_grid_;                         // a grid was given, and its body has none
   std::vector<std::string> widened_;                // arrays of float64 that hold single precision
   Vec3 origin_;                                     // of the body's frame, in the file's [m]

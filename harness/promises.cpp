@@ -7,6 +7,7 @@
 #include <array>
 
 #include "model/error.h"
+#include "model/words.h"
 #include "oracles/runs/run.h"
 
 namespace cutproof::harness {
@@ -93,11 +94,7 @@ bool Promises::cover(std::string_view property) const {
 uint32_t parse_promises(std::string_view text, const std::string& file, const std::string& field) {
   if (text == "*") return Promises{}.words;
   uint32_t bits = 0;
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = std::min(text.find(' ', begin), text.size());
-    const std::string_view word = text.substr(begin, end - begin);
-    begin = end + 1;
-    if (word.empty()) continue;
+  for (const std::string_view word : words_in(text)) {
     const auto found = std::find_if(kWords.begin(), kWords.end(), [&](const PromiseWord& w) { return w.name == word; });
     if (found == kWords.end()) {
       constexpr const auto& of_runs = oracles::kRunPromises;

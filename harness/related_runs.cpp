@@ -20,9 +20,6 @@ namespace {
 using oracles::RelatedRun;
 using oracles::RunCoupling;
 
-// Times of one frame in two runs, relative: sums of steps round.
-constexpr double kSameTime = 1e-9;
-
 // One run where it is, with the coupling that holds.
 class OpenRun {
  public:
@@ -36,7 +33,7 @@ class OpenRun {
   }
   const std::string& path() const { return path_; }
   const RunSegment& segment() const { return frames_.segment(); }
-  bool begins_segment() const { return frames_.begins_segment(); }
+  const oracles::RunHeader& header() const { return frames_.header(); }
   const std::vector<double>& mass() const { return mass_; }
   RelatedRun where() const { return {frames_.frame(), frames_.coupling(), frames_.has_new_coupling()}; }
 
@@ -52,9 +49,9 @@ class Together {
   explicit Together(const std::vector<std::unique_ptr<OpenRun>>& runs) : runs_(runs) {}
 
   oracles::RunHeader header() const {
-    oracles::RunHeader all = runs_.front()->segment().header();
+    oracles::RunHeader all = runs_.front()->header();
     for (std::size_t k = 1; k < runs_.size(); ++k) {
-      const oracles::RunHeader more = runs_[k]->segment().header();
+      const oracles::RunHeader& more = runs_[k]->header();
       all.rest.insert(all.rest.end(), more.rest.begin(), more.rest.end());
       all.u = std::max(all.u, more.u);
     }
@@ -80,7 +77,8 @@ class Together {
       all.frame.index = one.frame.index;
       all.frame.time = one.frame.time;
       append(positions_, one.frame.positions), append(velocities_, one.frame.velocities);
-      append(spin_, one.frame.spin), append(blade_, one.frame.blade);
+      append(spin_, one.frame.spin);
+      if (blade_.empty()) append(blade_, one.frame.blade);  // the same blade cuts each body
       for (std::size_t i = 0; i < one.frame.positions.size(); ++i) {
         exists_.push_back(oracles::exists(one.frame, i));
       }
@@ -106,7 +104,7 @@ class Together {
     for (std::size_t g = 1; g < more.offsets.size(); ++g) to.offsets.push_back(before + more.offsets[g]);
     for (const int32_t i : more.members) to.members.push_back(i + shift);
     for (const int32_t i : more.cells) to.cells.push_back(i + shift);
-    to.corners = more.corners;
+    if (more.corners > 0) to.corners = more.corners;
   }
 
   const std::vector<std::unique_ptr<OpenRun>>& runs_;
@@ -124,36 +122,65 @@ struct HashOfPlace {
 };
 
 // Of each particle of the second run, which one of the first it is: as it says, or by where it rests.
-std::vector<int32_t> permutation_of(const RunSegment& a, const RunSegment& b, const std::string& path) {
-  const int64_t n = b.particles();
-  if (const Array* const given = b.arrays().find("permutation", {n})) {
-    const std::vector<int32_t> was = b.arrays().integers(*given);
+std::vector<int32_t> permutation_of(const OpenRun& a, const OpenRun& b) {
+  const int64_t n = b.segment().particles();
+  const NamedArrays& arrays = b.segment().arrays();
+  if (const Array* const given = arrays.find("permutation", {n})) {
+    const std::vector<int32_t> was = arrays.integers(*given);
     std::vector<uint8_t> taken(at(n));
     for (const int32_t i : was) {
       if (i < 0 || i >= n || taken[at(i)]++ != 0)
-        b.arrays().refuse("permutation", fmt::format("It names {} not once.", i), "Name each particle once.");
+        arrays.refuse("permutation", fmt::format("It names particle {} twice, or there is no such particle.", i),
+                      "Name each particle once.");
     }
     return was;
   }
-  const std::vector<Vec3> rest = a.header().rest, mixed = b.header().rest;
+  const std::vector<Vec3>&rest = a.header().rest, &mixed = b.header().rest;
   if (rest.empty() || rest.size() != mixed.size())
-    throw InputError(path, "permutation", "Nothing says which particle is which.",
+    throw InputError(b.path(), "permutation", "Nothing says which particle is which.",
                      "Write permutation, or rest in both.");
   std::unordered_map<Vec3, int32_t, HashOfPlace> by_place;
   for (std::size_t i = 0; i < rest.size(); ++i) {
     if (!by_place.emplace(rest[i], static_cast<int32_t>(i)).second)
-      throw InputError(path, "permutation", fmt::format("Particle {} rests where another one does.", i),
+      throw InputError(b.path(), "permutation", fmt::format("Particle {} rests where another one does.", i),
                        "Write permutation.");
   }
   std::vector<int32_t> was;
-  for (const Vec3 x : mixed) {
-    const auto found = by_place.find(x);
+  for (std::size_t i = 0; i < mixed.size(); ++i) {
+    const auto found = by_place.find(mixed[i]);
     if (found == by_place.end())
-      throw InputError(path, "rest", "A particle rests where none of the first run does.", "Write permutation.");
+      throw InputError(b.path(), "rest", fmt::format("Particle {} rests where none of the first run does.", i),
+                       "Write permutation.");
     was.push_back(found->second);
     by_place.erase(found);
   }
   return was;
+}
+
+// How many of the runs have another frame, to which each goes.
+int64_t all_next(const std::vector<std::unique_ptr<OpenRun>>& runs) {
+  int64_t there = 0;
+  for (const auto& run : runs) there += run->next();
+  return there;
+}
+
+// A run that was loaded from a checkpoint begins in the middle of the first one, to where this goes. Returns how many
+// of the disturbed runs are there, too.
+int64_t go_to_checkpoint(OpenRun& first, const OpenRun& later, const std::vector<std::unique_ptr<OpenRun>>& noise) {
+  int64_t in_noise = std::ssize(noise);
+  for (;;) {
+    const RelatedRun now = first.where();
+    const std::optional<double> begins = later.where().frame.time;
+    if (!now.frame.time || !begins)
+      throw InputError(first.path(), "time", "Nothing says when frames are.", "Write time in both.");
+    // Sums of steps round.
+    const double rounds = 4 * std::max(first.header().u, later.header().u) *
+                          static_cast<double>((now.frame.index + 1) * first.header().steps) * std::abs(*begins);
+    if (*now.frame.time >= *begins - rounds) return in_noise;
+    if (!first.next())
+      throw InputError(later.path(), "time", "It begins after the first run ends.", "Write a longer one.");
+    in_noise = all_next(noise);
+  }
 }
 
 JudgedRelation judge_refinement(const RelatedFiles& files, const std::function<void(int64_t)>& frame_done) {
@@ -162,11 +189,16 @@ JudgedRelation judge_refinement(const RelatedFiles& files, const std::function<v
   for (const std::string& path : files.others) runs.push_back(std::make_unique<OpenRun>(path));
   JudgedRelation judged;
   std::optional<oracles::RunRefinement> refinement;
-  while (std::all_of(runs.begin(), runs.end(), [](const auto& run) { return run->next(); })) {
+  for (;;) {
+    const int64_t there = all_next(runs);
+    if (refinement && there != std::ssize(runs)) {
+      if (there > 0) refinement->see_end_of_some(judged.frames);
+      break;
+    }
     if (!refinement) {
       std::vector<oracles::RunHeader> headers;
       for (const auto& run : runs) {
-        headers.push_back(run->segment().header());
+        headers.push_back(run->header());
         if (headers.size() > 1 && headers.back().steps <= headers[headers.size() - 2].steps)
           run->segment().arrays().refuse("steps", "It has no more substeps in a frame than the run before.",
                                          "Write steps, and give the coarsest run first.");
@@ -180,7 +212,7 @@ JudgedRelation judge_refinement(const RelatedFiles& files, const std::function<v
     if (frame_done) frame_done(judged.frames);
     ++judged.frames;
   }
-  judged.verdicts = refinement.value().verdicts();
+  judged.verdicts = refinement->verdicts();
   judged.differences = refinement->differences();
   return judged;
 }
@@ -198,30 +230,16 @@ JudgedRelation judge_relation(const oracles::RunMap& map, const RelatedFiles& fi
   std::vector<std::unique_ptr<OpenRun>> others, noise;
   for (const std::string& path : files.others) others.push_back(std::make_unique<OpenRun>(path));
   for (const std::string& path : files.noise) noise.push_back(std::make_unique<OpenRun>(path));
-  const auto all_next = [](const auto& runs) {
-    int64_t there = 0;
-    for (const auto& run : runs) there += run->next();
-    return there;
-  };
   Together second(others);
   std::optional<oracles::RunRelation> relation;
   JudgedRelation judged;
-  for (bool has_mass = false;;) {
+  for (;;) {
     const bool in_first = first.next();
-    const int64_t in_others = all_next(others), in_noise = all_next(noise);
+    const int64_t in_others = all_next(others);
+    int64_t in_noise = all_next(noise);
     if (!relation) {
-      // A run that was loaded from a checkpoint begins in the middle of the first one.
-      while (map.name() == "checkpoint" && in_first && in_others > 0) {
-        const std::optional<double> time = first.where().frame.time, begins = others.front()->where().frame.time;
-        if (!time || !begins)
-          throw InputError(files.first, "time", "Nothing says when frames are.", "Write time in both.");
-        if (*time >= *begins - kSameTime * std::abs(*begins)) break;
-        if (!first.next())
-          throw InputError(others.front()->path(), "time", "It begins after the first run ends.",
-                           "Write a longer one.");
-        all_next(noise);
-      }
-      relation.emplace(map, first.segment().header(), second.header(), static_cast<int>(noise.size()), files.bits);
+      if (map.name() == "checkpoint") in_noise = go_to_checkpoint(first, *others.front(), noise);
+      relation.emplace(map, first.header(), second.header(), static_cast<int>(noise.size()), files.bits);
       judged.particles = first.segment().particles();
     }
     const bool all = in_first && in_others == std::ssize(others) && in_noise == std::ssize(noise);
@@ -231,10 +249,10 @@ JudgedRelation judge_relation(const oracles::RunMap& map, const RelatedFiles& fi
     }
     if (map.needs_time() && !first.where().frame.time)
       throw InputError(files.first, "time", "A boost needs to know when frames are.", "Write time.");
-    if (map.name() == "permute" && judged.frames == 0)
-      relation->permute(permutation_of(first.segment(), others.front()->segment(), others.front()->path()));
-    if (!has_mass) relation->weigh(first.mass(), second.mass());
-    has_mass = true;
+    if (judged.frames == 0) {
+      if (map.name() == "permute") relation->permute(permutation_of(first, *others.front()));
+      relation->weigh(first.mass(), second.mass());
+    }
     std::vector<RelatedRun> disturbed;
     for (const auto& run : noise) disturbed.push_back(run->where());
     relation->see(first.where(), second.where(), disturbed);
@@ -243,6 +261,7 @@ JudgedRelation judge_relation(const oracles::RunMap& map, const RelatedFiles& fi
   }
   relation->finish();
   judged.verdicts = relation->verdicts();
+  for (const auto& [property, why] : relation->not_asked()) judged.not_judged.push_back({property, why});
   judged.notes = relation->notes();
   judged.sharpest = relation->sharpest();
   return judged;

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "harness/foreign_judge.h"
 #include "model/verdict.h"
 #include "oracles/runs/run_relation.h"
 
@@ -18,6 +19,7 @@ struct RelatedFiles {
 
 struct JudgedRelation {
   std::vector<Verdict> verdicts;
+  std::vector<NotJudged> not_judged;
   std::vector<std::string> notes;
   int64_t frames = 0, particles = 0;
   oracles::RelationSharpness sharpest;

@@ -9,8 +9,9 @@
 #include <utility>
 
 #include "model/at.h"
+#include "model/error.h"
 #include "model/io/limits.h"
-#include "oracles/rounding.h"
+#include "model/words.h"
 
 namespace cutproof::harness {
 
@@ -20,11 +21,7 @@ constexpr int64_t kMost = std::numeric_limits<int32_t>::max();
 
 uint32_t promises_of(const NamedArrays& in, const std::string& text) {
   uint32_t bits = 0;
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = std::min(text.find(' ', begin), text.size());
-    const std::string_view word = std::string_view(text).substr(begin, end - begin);
-    begin = end + 1;
-    if (word.empty()) continue;
+  for (const std::string_view word : words_in(text)) {
     const auto found = std::find(oracles::kRunPromises.begin(), oracles::kRunPromises.end(), word);
     if (found == oracles::kRunPromises.end()) {
       in.refuse("promises", fmt::format("A run cannot promise '{}'.", word),
@@ -104,9 +101,8 @@ RunSegment::RunSegment(io::ArrayFile contents, std::string file, int64_t frame)
   if (const Array* const parent = in_.find("parent", {particles_})) parent_ = in_.integers(*parent);
   if (const Array* const piece = in_.find("piece", {particles_})) piece_ = in_.integers(*piece);
   if (const Array* const vertices = find("vertices", {-1, 3})) vertices_ = in_.vectors(*vertices);
-  has_vertices_ = in_.has("vertices");
   if (const Array* const triangles = in_.find("triangles", {-1, 3})) {
-    if (!has_vertices_) in_.refuse("triangles", "There are no vertices.", "Write vertices of each frame.");
+    if (!has_vertices()) in_.refuse("triangles", "There are no vertices.", "Write vertices of each frame.");
     const std::vector<int32_t> corners = in_.integers(*triangles);
     triangles_.emplace();
     for (std::size_t k = 0; k < corners.size(); k += 3)
@@ -283,11 +279,13 @@ bool RunFrames::next() {
     in_segment_ = 0;
     segment_.reset();  // before the next one is read: two need not fit into memory
     std::optional<io::ArrayFile> contents = segments_.next();
-    if (!contents) return false;
+    if (!contents) {
+      if (begun_ == 0) throw InputError(segments_.source(), "", "It has no frame.", "Write at least one.");
+      return false;
+    }
     segment_ = std::make_unique<RunSegment>(std::move(*contents), segments_.source(), before_);
     if (begun_++ == 0) {
       header_ = segment_->header();
-      precision_ = segment_->precision();
     } else {
       segment_->refuse_what_is_given_once();
     }
@@ -318,7 +316,7 @@ void RunFrames::renew(oracles::RunCoupling given) {
 std::optional<Skin> RunFrames::skin() const {
   if (!segment_->has_vertices()) return std::nullopt;
   Skin skin;
-  const std::span<const Vec3> places = segment_->vertices(in_segment_);
+  const std::span<const Vec3> places = skin_places();
   skin.position.assign(places.begin(), places.end());
   skin.triangles = *triangles_;
   return skin;

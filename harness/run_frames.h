@@ -44,7 +44,7 @@ class RunSegment {
   // Nothing where this segment does not give them anew.
   std::optional<oracles::RunCoupling> coupling() const;
   std::vector<double> mass() const;  // [n] [kg]
-  bool has_vertices() const { return has_vertices_; }
+  bool has_vertices() const { return in_.has("vertices"); }
   std::span<const Vec3> vertices(int64_t k) const;  // of the skin, k-th frame of the segment
   const std::optional<Triangles>& triangles() const { return triangles_; }
 
@@ -72,7 +72,6 @@ class RunSegment {
   std::vector<double> time_, energy_;
   std::vector<uint8_t> alive_, held_, removed_;
   std::vector<int32_t> parent_, piece_;
-  bool has_vertices_ = false;
   std::vector<Vec3> vertices_;
   std::optional<Triangles> triangles_;
 };
@@ -83,17 +82,18 @@ class RunFrames {
   explicit RunFrames(io::RunSegments segments) : segments_(std::move(segments)) {}
 
   // To the first frame, then to the one after; false: there is none. All that the others give is valid until then.
+  // Throws InputError where a segment cannot be understood, and if there is no frame at all.
   bool next();
   const oracles::RunFrame& frame() const { return frame_; }
   const RunSegment& segment() const { return *segment_; }
   bool begins_segment() const { return in_segment_ == 0; }  // the frame is the first of its segment
   int64_t segments() const { return begun_; }               // begun so far
-  // Of the first segment, which alone gives them; valid after the last frame, too.
+  // Of the first segment, which alone gives it; valid after the last frame, too.
   const oracles::RunHeader& header() const { return *header_; }
-  Precision precision() const { return precision_; }
   // What holds in the frame: what a segment does not give anew goes on. Null: nothing was given yet.
   const oracles::RunCoupling* coupling() const { return coupling_ ? &*coupling_ : nullptr; }
   bool has_new_coupling() const { return begins_segment() && is_new_coupling_; }
+  std::span<const Vec3> skin_places() const { return segment_->vertices(in_segment_); }
   // The skin of the frame; its vertices have no owners.
   std::optional<Skin> skin() const;
   bool has_new_triangles() const { return begins_segment() && segment_->triangles().has_value(); }
@@ -105,7 +105,6 @@ class RunFrames {
   std::unique_ptr<RunSegment> segment_;
   oracles::RunFrame frame_;
   std::optional<oracles::RunHeader> header_;
-  Precision precision_ = Precision::binary64;
   std::optional<RunSegment::Triangles> triangles_;
   std::optional<oracles::RunCoupling> coupling_;
   bool is_new_coupling_ = false;

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "oracles/oracles.h"
@@ -21,17 +20,15 @@ void RunSkin::take(std::optional<Verdict>& known, Verdict verdict, int64_t frame
 
 void RunSkin::see(const RunFrames& frames, const oracles::RunJudge& judge) {
   const oracles::RunFrame& frame = frames.frame();
-  const std::optional<Skin> skin = frames.skin();
-  if (!skin) return;
-  const bool is_finite_all = std::ranges::all_of(skin->position, [](Vec3 x) { return is_finite(x); });
+  if (!frames.segment().has_vertices()) return;
+  const bool is_finite_all = std::ranges::all_of(frames.skin_places(), [](Vec3 x) { return is_finite(x); });
   if (!frames.has_new_triangles() && frame.blade.empty() && is_finite_all) return;
+  const std::optional<Skin> skin = frames.skin();
   bool any_alive = false;
   for (std::size_t i = 0; i < frame.positions.size() && !any_alive; ++i) any_alive = oracles::exists(frame, i);
   const Verdict surface = closed_skin(*skin, any_alive);
-  const bool is_surface = surface.holds;
   take(surface_, surface, frame.index);
-  was_open_ |= !is_surface;
-  if (!frames.header().promised(oracles::RunPromise::skin) || !is_surface) return;
+  if (!frames.header().promised(oracles::RunPromise::skin) || !surface.holds) return;
   const oracles::RunPieces pieces = judge.pieces();
   if (pieces.units == 0) return;
   const int64_t shells = oracles::count_shells(*skin).outer;
@@ -59,9 +56,9 @@ void RunSkin::finish(bool is_promised, JudgedRun& judged) const {
   if (match_) {
     judged.verdicts.push_back(*match_);
   } else {
-    judged.not_judged.push_back({"skin match", !is_promised ? "needs the promise 'skin'"
-                                               : was_open_  ? "the skin is no closed surface"
-                                                            : "needs tissue"});
+    judged.not_judged.push_back({"skin match", !is_promised                   ? "needs the promise 'skin'"
+                                               : surface_ && !surface_->holds ? "the skin is no closed surface"
+                                                                              : "needs tissue"});
   }
   judged.not_judged.push_back(
       {"skin geometry", "whether a skin crosses itself is judged at rest, and where its vertices rest is not known"});

@@ -18,7 +18,6 @@ class RunSkin {
  private:
   void take(std::optional<Verdict>& known, Verdict verdict, int64_t frame);
   std::optional<Verdict> surface_, match_;
-  bool was_open_ = false;
 };
 
 }  // namespace cutproof::harness

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "model/at.h"
+#include "model/bare_graph.h"
 #include "model/error.h"
 
 namespace cutproof::harness {
@@ -32,23 +33,14 @@ Edges edges_of_cells(const oracles::RunCoupling& coupling) {
   return edges;
 }
 
-// Each at both of its ends, none twice; what cannot be is left out.
+// What cannot be is left out.
 void put_edges(Body& body, const Edges& edges) {
   const auto n = static_cast<int32_t>(body.rest.size());
-  Edges both;
+  std::vector<std::pair<int32_t, int32_t>> possible;
   for (const auto& [a, b] : edges) {
-    if (a < 0 || b < 0 || a >= n || b >= n || a == b) continue;
-    both.push_back({a, b});
-    both.push_back({b, a});
+    if (a >= 0 && b >= 0 && a < n && b < n && a != b) possible.emplace_back(a, b);
   }
-  std::sort(both.begin(), both.end());
-  both.erase(std::unique(both.begin(), both.end()), both.end());
-  body.edge_offsets.assign(at(n) + 1, 0);
-  for (const auto& [a, b] : both) {
-    ++body.edge_offsets[at(a) + 1];
-    body.edge_ends.push_back(b);
-  }
-  for (std::size_t i = 0; i < at(n); ++i) body.edge_offsets[i + 1] += body.edge_offsets[i];
+  set_edges(body, std::move(possible));
 }
 
 // Where the run does not say: the median edge, or as if the particles filled their box.
@@ -101,8 +93,8 @@ void RunStates::make_body() {
   const auto positions = frames_->frame().positions.first(std::min(frames_->frame().positions.size(), at(particles_)));
   std::copy(positions.begin(), positions.end(), body.rest.begin());
   put_edges(body, header.edges);
-  const auto coupling = frames_->segment().coupling();
-  if (header.edges.empty() && coupling && coupling->corners > 0) put_edges(body, edges_of_cells(*coupling));
+  const oracles::RunCoupling* const coupling = frames_->coupling();
+  if (header.edges.empty() && coupling != nullptr && coupling->corners > 0) put_edges(body, edges_of_cells(*coupling));
   body.grid.spacing = header.spacing > 0 ? header.spacing : spacing_of(body);
 }
 
@@ -124,22 +116,18 @@ void RunStates::take() {
   state_.frame = at_ + 1;
   state_.removed.clear();
   for (std::size_t i = 0; i < std::min(frame.positions.size(), state_.x.size()); ++i) {
-    const Vec3 x = frame.positions[i];
-    const bool is_blank = std::isnan(x.x) && std::isnan(x.y) && std::isnan(x.z);
-    const bool is_there =
-        !is_blank && (frame.alive.empty() || frame.alive[i] != 0) && (frame.removed.empty() || frame.removed[i] == 0);
+    const bool is_there = oracles::exists(frame, i);
     if (state_.alive[i] != 0 && !is_there) state_.removed.push_back(static_cast<int32_t>(i));
     state_.alive[i] = is_there ? 1 : 0;
-    state_.x[i] = x;
+    state_.x[i] = frame.positions[i];
   }
   swept_.assign(frame.blade.begin(), frame.blade.end());
   time_ = frame.time;
-  if (frames_->begins_segment()) take_coupling();
+  if (frames_->has_new_coupling()) take_coupling();
   state_.skin = frames_->skin().value_or(Skin());
 }
 
 void RunStates::take_coupling() {
-  if (!frames_->has_new_coupling()) return;
   const oracles::RunCoupling* const given = frames_->coupling();
   Clusters& groups = state_.clusters;
   groups = {};

@@ -47,7 +47,6 @@ class PiecesOverTime {
  public:
   // Of the next frame: as oracles::RunJudge gives them. Particles only become more.
   void add(const std::vector<int32_t>& piece);
-  bool any() const { return !now_.empty(); }
   // After that frame, -1 of particles that are not there yet; `particles`: how many.
   const std::vector<int32_t>& after(int64_t frame, int32_t particles);
 

@@ -2,7 +2,9 @@
 #pragma once
 #include <algorithm>
 #include <cstdint>
+#include <numeric>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "model/at.h"
@@ -47,6 +49,20 @@ inline std::string problem_of_edges(const Body& body) {
     }
   }
   return "";
+}
+
+// Gives a body whose particles are there these edges, which may stand at one end or both, and more than once. Requires
+// that they lead from particles to others.
+inline void set_edges(Body& body, std::vector<std::pair<int32_t, int32_t>> edges) {
+  for (std::size_t k = edges.size(); k-- > 0;) edges.emplace_back(edges[k].second, edges[k].first);
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+  body.edge_offsets.assign(body.rest.size() + 1, 0);
+  for (const auto& [a, b] : edges) {
+    ++body.edge_offsets[at(a) + 1];
+    body.edge_ends.push_back(b);
+  }
+  std::partial_sum(body.edge_offsets.begin(), body.edge_offsets.end(), body.edge_offsets.begin());
 }
 
 // The same tissue without its grid.

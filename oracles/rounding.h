@@ -43,6 +43,14 @@ inline Vec3 stored_place(const Body& body, Precision precision, int32_t i, Vec3 
 // 3e-14 (Higham and Mary 2019; tolerances.md, Linear momentum).
 inline constexpr double kDeviations = 8;
 
+// An explicit method is stable only while dt² k / m <= 4, so forces add at most so many times what moved, divided by
+// the substep, to a velocity; more than that is not there to be rounded (tolerances.md, Runs).
+inline constexpr double kStableForces = 4;
+
+// How many times the noise that was seen another run of the same simulator may have, at most (tolerances.md, A kick in
+// a noisy simulator).
+inline constexpr double kNoiseFactor = 64;
+
 // Of many comparisons the one that comes nearest to its bound, or goes farthest beyond. What is not a number is beyond.
 struct Nearest {
   double share = -1, measured = 0, bound = 0;

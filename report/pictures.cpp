@@ -220,7 +220,11 @@ constexpr std::size_t kMostPatches = 500, kPatchesOfPage = 20'000;
 json swept_json(const std::vector<Vec3>& corners, std::size_t most, int64_t& left_out) {
   std::vector<std::size_t> patches;
   for (std::size_t k = 0; k + 4 <= corners.size(); k += 4) {
-    if (std::all_of(&corners[k], &corners[k] + 4, [](Vec3 x) { return norm(x) < 1e30; })) patches.push_back(k);
+    if (std::all_of(&corners[k], &corners[k] + 4, [](Vec3 x) {
+          return std::isfinite(static_cast<float>(x.x)) && std::isfinite(static_cast<float>(x.y)) &&
+                 std::isfinite(static_cast<float>(x.z));
+        }))
+      patches.push_back(k);
   }
   json list = json::array();
   const std::size_t shown = std::min(patches.size(), most);

@@ -8,8 +8,9 @@ SPDX-License-Identifier: MIT
         cutproof.judge(rotations=my_function)       # my_function(a, previous) -> r
 
 `judge` asks your function many hard questions and raises Failed, with the smallest case that it could find, where an
-answer is wrong. `kick` judges a whole simulator by where its particles were with and without a kick of one piece. It needs Linux, numpy and the program `cutproof`: in the environment variable CUTPROOF, beside this
-file, or in PATH. What each function gets and returns: docs/reference/python.md.
+answer is wrong. `kick` judges a simulator by where its particles were with and without a kick of one piece, `relate` by
+two of its runs. It needs Linux, numpy and the program `cutproof`: in the environment variable CUTPROOF, beside this file,
+or in PATH. What each function gets and returns: docs/reference/python.md.
 
 This process answers questions that the program asks over a socket; arrays lie in memory that both map. The layouts
 below repeat guests/wire.h.
@@ -96,7 +97,8 @@ class _Hello(ctypes.Structure):
                 ("operations", ctypes.c_uint32), ("spans", ctypes.c_uint32), ("device", ctypes.c_int32),
                 ("real", ctypes.c_int32), ("has_promises", ctypes.c_int32), ("remembers_faults", ctypes.c_int32),
                 ("request_bytes", ctypes.c_uint32), ("reply_bytes", ctypes.c_uint32), ("name", ctypes.c_char * 64),
-                ("version", ctypes.c_char * 64), ("promises", ctypes.c_char * 512), ("limits", ctypes.c_char * 512), ("text", ctypes.c_char * 512)]
+                ("version", ctypes.c_char * 64), ("promises", ctypes.c_char * 512),
+                ("limits", ctypes.c_char * 512), ("text", ctypes.c_char * 512)]
 
 
 def _place_in_arena(arena, size, at_end):
@@ -161,20 +163,24 @@ class _OutOfTime(BaseException):
     """Raised inside a function that has not answered in time, so that it ends and its traceback says where it was."""
 
 
-def _as_array(value, name, wanted, shape, device):
-    """What a function returned as an array of this type and shape, of which None may be any number."""
-    if value is None:
-        raise _Broken(f"it returned no {name}")
+def _on_host(value, name, device):
+    """An array of numpy; of one that lies on the device a copy."""
     interface = getattr(value, "__cuda_array_interface__", None)
     if interface is not None:
         if device is None:
             raise _Broken(f'{name} lies on a CUDA device; ask with device="cuda"')
-        array = device.fetch(interface, name)
-    else:
-        try:
-            array = numpy.asarray(value)
-        except (TypeError, ValueError) as error:
-            raise _Broken(f"{name} cannot become an array: {error}") from error
+        return device.fetch(interface, name)
+    try:
+        return numpy.asarray(value)
+    except (TypeError, ValueError) as error:
+        raise _Broken(f"{name} cannot become an array: {error}") from error
+
+
+def _as_array(value, name, wanted, shape, device):
+    """What a function returned as an array of this type and shape, of which None may be any number."""
+    if value is None:
+        raise _Broken(f"it returned no {name}")
+    array = _on_host(value, name, device)
     wanted = numpy.dtype(wanted)
     if array.size == 0 and not shape[0]:  # what is empty holds nothing of a wrong type
         return numpy.zeros([extent or 0 for extent in shape], wanted)
@@ -236,17 +242,15 @@ def _run_of(frames, wanted, real, device):
         n = len(frame["positions"])
         counts.append(n)
         if "removed" in frame and "alive" not in frame:
-            frame = dict(frame, alive=~numpy.asarray(frame["removed"], bool))
+            frame = dict(frame, alive=~_on_host(frame["removed"], f"removed of frame {f}", device).astype(bool))
         for name, (_, shape) in _OF_FRAME.items():
             if frame.get(name) is None:
                 continue
-            value = frame[name]
+            value = _on_host(frame[name], f"{name} of frame {f}", device)
             if name == "alive":
-                value = numpy.asarray(value, bool).view(numpy.uint8)
-            elif name == "steps" or name == "parent":
-                value = numpy.asarray(value)
-            elif device is None:  # whole numbers are places, too
-                value = numpy.asarray(value, dtype=None if numpy.asarray(value).dtype.kind == "f" else float)
+                value = value.astype(bool).view(numpy.uint8)
+            elif name not in _WHOLE and value.dtype.kind != "f":  # whole numbers are places, too
+                value = value.astype(float)
             made[name].append(_as_array(value, f"{name} of frame {f}", _WHOLE.get(name, real),
                                         tuple(n if c == "n" else int(c) for c in shape), device))
         groups.append(_groups_of(frame.get("groups"), f, real, device))
@@ -275,8 +279,10 @@ def _groups_of(groups, f, real, device):
         return [None if part is None else _as_array(part, f"{what} of {name}", kind, (None,), device)
                 for part, what, kind in zip((*groups, None), ("offsets", "members", "weights"),
                                             (numpy.int64, numpy.int32, real))]
+    if hasattr(groups, "__cuda_array_interface__"):
+        groups = _on_host(groups, name, device)
+    members = numpy.concatenate([_on_host(group, name, device) for group in groups] or [numpy.zeros(0, int)])
     offsets = numpy.cumsum([0] + [len(group) for group in groups])
-    members = numpy.concatenate([numpy.asarray(group) for group in groups]) if len(groups) else numpy.zeros(0, int)
     return [offsets, _as_array(members, name, numpy.int32, (None,), device), None]
 
 
@@ -714,10 +720,11 @@ def judge(*, rotations=None, components=None, surface=None, clusters=None, disse
           simplify=20, save=".", keep_going=False, verbose=False):
     """Asks the functions that are given, each in many cases. Returns a Result; raises Failed, Skipped or Error.
 
-    cases, seconds: how many matrices, bodies or scenes for each function, or for how long. sizes: of large questions, as matrices
-    or particles; (): none; None: beside 65536 and more. promises: words of what is vouched
-    for; None: what goes without saying. limits: words of what `dissect` takes; None: all. time_limit: seconds for each answer. simplify: seconds for making each failing
-    case smaller. save: folder for failing cases. keep_going: beyond ten questions that were not answered.
+    cases, seconds: how many matrices, bodies or scenes for each function, or for how long. sizes: of large questions, as
+    matrices or particles; (): none; None: beside 65536 and more. promises: words of what is vouched for; None: what goes
+    without saying. limits: words of what `dissect` takes; None: all. time_limit: seconds for each answer. simplify:
+    seconds for making each failing case smaller. save: folder for failing cases. keep_going: beyond ten questions that
+    were not answered.
     """
     __tracebackhide__ = True  # pytest shows the caller, not us
     functions = _given(rotations=rotations, components=components, surface=surface, clusters=clusters, dissect=dissect)
@@ -765,8 +772,8 @@ def replay(file, *, rotations=None, components=None, surface=None, clusters=None
 def kick(positions, kicked, piece, **arrays):
     """Whether a kick of one piece moves another. Returns, and raises, as judge does.
 
-    positions (f, n, 3): where particles were, frame by frame, in m. kicked (f, n, 3): the same with a kick of one piece;
-    or a list of such runs. piece (n): which particles belong together. arrays: again, alive, kicked_piece, directions,
+    positions (f, n, 3): where particles were, frame by frame, in m. kicked (f, n, 3): the same with a kick of one
+    piece; or a list of such runs. piece (n): which particles belong together. arrays: again, alive, kicked_piece, directions,
     equal, tolerance, mass, steps, spacing, time: docs/reference/foreign_state.md, A kick.
     """
     __tracebackhide__ = True

@@ -64,7 +64,7 @@ std::optional<ArrayFile> RecordedSegments::next() {
     snapshot = reader_.snapshot(next_++);
   } while (snapshot->stage != Stage::skin);
   const State& state = snapshot->state;
-  const bool is_first = next_ == 1;
+  const bool is_first = !std::exchange(has_begun_, true);
   const int64_t frame = state.frame - 1, n = setup.body.particle_count();
   ArrayFile made;
   Arrays& arrays = made.arrays;

@@ -19,6 +19,7 @@ class RecordedSegments {
  private:
   RecordingReader reader_;
   int64_t next_ = 0;
+  bool has_begun_ = false;
   double time_ = 0;
   std::vector<int64_t> offsets_;  // of the clusters of the segment before
   std::vector<int32_t> members_;

@@ -53,11 +53,10 @@ std::vector<std::string> files_in(const std::string& folder) {
 void require_equal_steps(const std::string& path, const std::vector<int64_t>& numbers) {
   for (std::size_t k = 2; k < numbers.size(); ++k) {
     if (numbers[k] - numbers[k - 1] == numbers[1] - numbers[0]) continue;
-    throw InputError(
-        path, "",
-        fmt::format("Its segments {:06}, {:06} and {:06} do not ascend by equal steps, as {:06} and {:06} do.",
-                    numbers[k - 2], numbers[k - 1], numbers[k], numbers[0], numbers[1]),
-        "Write all segments, with consecutive numbers.");
+    throw InputError(path, "",
+                     fmt::format("Segment {:06} comes after {:06}, and {:06} is expected.", numbers[k], numbers[k - 1],
+                                 numbers[k - 1] + numbers[1] - numbers[0]),
+                     "Write all segments, with consecutive numbers.");
   }
 }
 
@@ -84,6 +83,8 @@ RunSegments RunSegments::of(const std::string& path) {
   if (!is_array_file(path)) return of_recording(path);
   std::vector<ArrayFile> only;
   only.push_back(read_array_file(path));
+  if (find_array(only.front().arrays, "kicked") != nullptr)
+    throw InputError(path, "kicked", "This is a kick, and no run.", "Use cutproof kick.");
   if (!is_segment(only.front()))
     throw InputError(path, "positions", "This is no run.", "Write positions with the axes frame, particle and 3.");
   return RunSegments(path, std::move(only));

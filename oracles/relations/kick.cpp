@@ -1,23 +1,23 @@
 #include "oracles/relations/kick.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
+#include <ranges>
 #include <set>
 #include <utility>
 
 #include "model/at.h"
+#include "oracles/rounding.h"
 
 namespace cutproof::oracles {
 
 namespace {
 
-// How many times the noise that was seen once another run may have, at most (tolerances.md, A kick in a noisy
-// simulator).
-constexpr double kNoiseFactor = 64;
 // The greatest share of a kick that a solver or a time step of all pieces explains, in another piece or between equal
 // answers: beyond, it would not have converged.
 constexpr double kOfASolver = 1e-2;
@@ -191,7 +191,6 @@ double mass_of(const KickedRuns& runs, int32_t particle) { return runs.mass.empt
 
 // tolerances.md, The answer to a kick.
 std::vector<double> resolution_of(const Differences& differences, const KickAnswer& answer) {
-  constexpr double kStableForces = 4, kDeviations = 8;
   const KickedRuns& runs = differences.runs;
   double squares = 0, total = 0;
   for (int32_t i = 0; i < runs.particles; ++i) {
@@ -508,7 +507,7 @@ Verdict answers_are_equal(const KickedRuns& runs, const std::map<std::size_t, Ce
     verdict.holds = false;
     verdict.witness.text = fmt::format(
         "{}: rounding and noise may be as large as the answers of kicks {}; kick harder, or write earlier frames",
-        kNotJudged, kicks.begin()->first);
+        kNotJudged, fmt::join(std::views::keys(kicks), ", "));
   }
   return verdict;
 }

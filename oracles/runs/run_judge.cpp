@@ -38,9 +38,6 @@ enum Which : std::size_t {
   kProperties
 };
 
-// An explicit method is stable only while its forces change velocities by no more than so many times what moved
-// divided by the substep (dt² k / m <= 4); more than that is not there to be rounded.
-constexpr double kStable = 4;
 // How much faster than any velocity at the ends of frames those in between may be, about their mean.
 constexpr double kBetween = 2;
 
@@ -466,7 +463,7 @@ class RunJudge::Implementation {
       p_was_sum += m * velocity_was_[i];
       x_sum += m * frame.positions[i];
       x_was_sum += m * was_[i];
-      const double rounds = norm(frame.velocities[i]) + norm(velocity_was_[i]) + kStable * farthest / dt_s;
+      const double rounds = norm(frame.velocities[i]) + norm(velocity_was_[i]) + kStableForces * farthest / dt_s;
       squares += m * rounds * m * rounds;
     }
     const Vec3 p = p_sum, p_was = p_was_sum, x = x_sum, x_was = x_was_sum;

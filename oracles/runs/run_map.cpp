@@ -156,6 +156,12 @@ class Mapping {
   const std::string& file_;
 };
 
+using Rules = std::vector<std::pair<std::string, ArrayRule>>;
+ArrayRule rule_among(const Rules& more, const std::string& array) {
+  const auto given = std::find_if(more.begin(), more.end(), [&](const auto& rule) { return rule.first == array; });
+  return given == more.end() ? rule_of(array) : given->second;
+}
+
 int64_t particles_of(const Arrays& input, const std::string& file) {
   for (const std::string_view name : {"rest", "positions", "mass"}) {
     if (const Array* const array = find_array(input, name)) {
@@ -167,8 +173,7 @@ int64_t particles_of(const Arrays& input, const std::string& file) {
   throw InputError(file, "rest", "Nothing says how many particles there are.", "Write rest, positions or mass.");
 }
 
-void permute(Arrays& arrays, const std::vector<std::pair<std::string, ArrayRule>>& more, uint64_t seed,
-             const std::string& file) {
+void permute(Arrays& arrays, const Rules& more, uint64_t seed, const std::string& file) {
   const int64_t n = particles_of(arrays, file);
   std::vector<int32_t> was(at(n)), becomes(at(n));  // of new numbers; of old ones
   std::iota(was.begin(), was.end(), 0);
@@ -176,8 +181,7 @@ void permute(Arrays& arrays, const std::vector<std::pair<std::string, ArrayRule>
   for (int64_t i = n - 1; i > 0; --i) std::swap(was[at(i)], was[at(static_cast<int64_t>(random() % at(i + 1)))]);
   for (int64_t i = 0; i < n; ++i) becomes[at(was[at(i)])] = static_cast<int32_t>(i);
   for (Array& array : arrays) {
-    ArrayRule rule = rule_of(array.name);
-    for (const auto& [name, given] : more) rule = name == array.name ? given : rule;
+    const ArrayRule rule = rule_among(more, array.name);
     if (rule.of_particles) {
       for (int64_t k = 0; k < array.count(); ++k) {
         const int64_t i = array.integer(k);
@@ -287,8 +291,7 @@ Arrays mapped_input(const RunMap& map, const Arrays& input, const std::vector<st
   const Mapping mapping(map, input, file);
   Arrays made;
   for (const Array& array : input) {
-    ArrayRule rule = rule_of(array.name);
-    for (const auto& [name, given] : more) rule = name == array.name ? given : rule;
+    const ArrayRule rule = rule_among(more, array.name);
     if (!rule.known) {
       throw InputError(file, array.name, "How it follows a map is not known.",
                        fmt::format("Say its powers of length, time and mass, as --dimension {}=-1,-2,1.", array.name));

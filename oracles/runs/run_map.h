@@ -43,7 +43,7 @@ class RunMap {
   Vec3 velocity(Vec3 v) const { return mapped(v, Follows::velocity, {1, -1, 0}); }
   bool reverses() const { return signs_[0] * signs_[1] * signs_[2] * parity_ < 0; }  // right hands become left ones
   bool needs_time() const { return boost_ != Vec3{}; }
-  // Whether every number is mapped without rounding; and whether roots of even powers of them are, too.
+  // Whether every number is mapped without rounding.
   bool is_exact() const { return is_exact_; }
 
  private:
@@ -56,7 +56,7 @@ class RunMap {
   bool is_exact_ = true;
 };
 
-// What docs/reference/run.md names. Of names that it does not know `nothing`, and `known` is false.
+// Of an array that docs/reference/run.md names; of any other `known` is false.
 struct ArrayRule {
   Follows how = Follows::nothing;
   Dimension of;

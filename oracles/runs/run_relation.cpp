@@ -15,13 +15,8 @@ namespace cutproof::oracles {
 namespace {
 
 constexpr const char* kSource = "tolerances.md, Relations between runs";
-// How many times the noise that was seen another run may have, at most: as of a kick.
-constexpr double kNoiseFactor = 64;
 // Relative, in units of u: inputs that were computed, such as masses summed over cells.
 constexpr double kInputRounds = 256;
-// Forces add at most so many times what moved, divided by the substep, to a velocity (tolerances.md, Runs).
-constexpr double kStable = 4;
-
 enum Which : std::size_t {
   kInputs,
   kFrames,
@@ -37,21 +32,24 @@ enum Which : std::size_t {
   kJudged,
   kProperties
 };
+// `needs`: what both runs have to have so that it is asked; null: it is asked, or the user has not.
 struct Property {
-  const char *name, *unit;
+  const char *name, *unit, *needs;
 };
-constexpr Property kNames[kProperties] = {{"related inputs", "1"},
-                                          {"related frames", "1"},
-                                          {"related existence", "1"},
-                                          {"related positions", "m"},
-                                          {"related velocities", "m/s"},
-                                          {"related spin", "kg m²/s"},
-                                          {"related contact impulse", "kg m/s"},
-                                          {"related energy", "J"},
-                                          {"related coupling", "1"},
-                                          {"same bits", "1"},
-                                          {"noise is there", "1"},
-                                          {"something was judged", "m"}};
+constexpr Property kNames[kProperties] = {
+    {"related inputs", "1", nullptr},
+    {"related frames", "1", nullptr},
+    {"related existence", "1", nullptr},
+    {"related positions", "m", nullptr},
+    {"related velocities", "m/s", "needs velocities, and time or --noise"},
+    {"related spin", "kg m²/s", "needs spin and --noise"},
+    {"related contact impulse", "kg m/s", "needs contact_impulse and --noise"},
+    {"related energy", "J", "needs energy and --noise, and no boost"},
+    {"related coupling", "1", "needs coupling groups or cells"},
+    {"same bits", "1", nullptr},
+    {"noise is there", "1", nullptr},
+    {"something was judged", "m", nullptr},
+};
 
 Verdict fresh(Which which) {
   Verdict verdict;
@@ -67,6 +65,10 @@ double distance(Vec3 a, Vec3 b) {
   return std::isnan(length) ? std::numeric_limits<double>::infinity() : length;
 }
 bool same_bits(Vec3 a, Vec3 b) { return a == b || (is_blank(a) && is_blank(b)); }
+
+// How far positions of two runs differ after n substeps by what each rounds, carried on by velocities and grown by
+// nothing, in units of u times the farthest place.
+double carried_roundings(double n) { return kDeviations * (kStableForces * n * std::sqrt(n / 3) + std::sqrt(n)); }
 
 // Groups and cells as sets of particles, in an order that nobody chose. Requires members that `renamed` knows.
 std::vector<std::vector<int32_t>> sets_of(const RunCoupling& coupling, const std::vector<int32_t>& renamed) {
@@ -190,6 +192,14 @@ class RunRelation::Implementation {
     }
     return all;
   }
+  std::vector<RunJudge::NotAsked> not_asked() const {
+    std::vector<RunJudge::NotAsked> all;
+    for (std::size_t k = 0; k < kProperties; ++k) {
+      if (kNames[k].needs != nullptr && found_[k].verdict.checked == 0 && found_[k].verdict.holds)
+        all.push_back({kNames[k].name, holds(kFrames) ? kNames[k].needs : "the runs have not the same particles"});
+    }
+    return all;
+  }
   const std::vector<std::string>& notes() const { return notes_; }
   RelationSharpness sharpest() const { return sharpest_; }
 
@@ -216,7 +226,7 @@ class RunRelation::Implementation {
   }
   double length() const { return map_.scale({1, 0, 0}); }
   double steps() const { return static_cast<double>(a_.steps); }
-  // What a number is multiplied by: so far apart numbers of A are what is told, whatever the units of B.
+  // Numbers of B are divided by it: verdicts tell distances in the units of A.
   double scale(Dimension of) const { return map_.scale(of); }
 
   // The particle of B that particle i of A is.
@@ -279,12 +289,12 @@ class RunRelation::Implementation {
       inverse_[at(permutation_[i])] = static_cast<int32_t>(i);
   }
 
-  // Sums of steps round differently in other units.
+  // A time is a sum of steps since the run began, which rounds differently in other units.
   void compare_times(const RunFrame& a, const RunFrame& b) {
     if (!a.time || !b.time) return;
     ++found_[kInputs].verdict.checked;
     const double expected = scale({0, 1, 0}) * *a.time;
-    if (std::abs(*b.time - expected) <= 4 * u_ * static_cast<double>(frames_) * steps() * std::abs(expected)) return;
+    if (std::abs(*b.time - expected) <= 4 * u_ * static_cast<double>(frame_ + 1) * steps() * std::abs(expected)) return;
     fail(kInputs, {}, "frame {} of the second run is at {} s, and the map makes {} s of the first", frame_, *b.time,
          expected);
   }
@@ -313,13 +323,13 @@ class RunRelation::Implementation {
     }
   }
 
-  // Without disturbed runs: what each substep rounds, carried on by velocities and grown by nothing. Of positions [m]
-  // or velocities [m/s]; infinite where nothing is known.
+  // Without disturbed runs: how far right runs differ, in positions [m] or velocities [m/s]; infinite where nothing is
+  // known.
   double rounds(Which which) const {
     const double n = std::max(1.0, static_cast<double>(frames_) * steps());
-    if (which == kPositions) return kDeviations * u_ * extent_ * (kStable * n * std::sqrt(n / 3) + std::sqrt(n));
+    if (which == kPositions) return u_ * extent_ * carried_roundings(n);
     if (which == kVelocities && substep_ > 0)
-      return kDeviations * u_ * (kStable + 1) * extent_ / substep_ * std::sqrt(n);
+      return kDeviations * u_ * (kStableForces + 1) * extent_ / substep_ * std::sqrt(n);
     return std::numeric_limits<double>::infinity();
   }
 
@@ -461,20 +471,34 @@ void RunRelation::see(const RelatedRun& a, const RelatedRun& b, std::span<const 
 void RunRelation::see_end_of_some(int64_t frame) { self_->see_end_of_some(frame); }
 void RunRelation::finish() { self_->finish(); }
 std::vector<Verdict> RunRelation::verdicts() const { return self_->verdicts(); }
+std::vector<RunJudge::NotAsked> RunRelation::not_asked() const { return self_->not_asked(); }
 std::vector<std::string> RunRelation::notes() const { return self_->notes(); }
 RelationSharpness RunRelation::sharpest() const { return self_->sharpest(); }
 
 RunRefinement::RunRefinement(std::vector<RunHeader> headers)
     : headers_(std::move(headers)), farthest_(headers_.size() - 1, 0.0) {}
 
+void RunRefinement::fail(std::string text) {
+  if (wrong_.empty()) wrong_ = std::move(text);
+}
+
+void RunRefinement::see_end_of_some(int64_t frame) {
+  fail(fmt::format("a run ends after {} frames, and another one goes on", frame));
+}
+
 void RunRefinement::see(std::span<const RelatedRun> runs) {
   ++frames_;
+  const double n = static_cast<double>(frames_ * headers_.back().steps);
+  for (const RelatedRun& run : runs) {
+    const std::optional<double> time = run.frame.time, wanted = runs.front().frame.time;
+    if (time && wanted && !(std::abs(*time - *wanted) <= 4 * headers_.back().u * n * std::abs(*wanted)))
+      fail(fmt::format("frame {} is at {} s in one run and at {} s in another", frames_ - 1, *wanted, *time));
+  }
   for (std::size_t k = 0; k + 1 < runs.size(); ++k) {
     const std::span<const Vec3> coarse = runs[k].frame.positions, fine = runs[k + 1].frame.positions;
-    if (coarse.size() != fine.size()) {
-      fits_ = false;
-      return;
-    }
+    if (coarse.size() != fine.size())
+      return fail(fmt::format("frame {} has {} particles in one run and {} in another", frames_ - 1, coarse.size(),
+                              fine.size()));
     for (std::size_t i = 0; i < coarse.size(); ++i) {
       const bool in_coarse = exists(runs[k].frame, i), in_fine = exists(runs[k + 1].frame, i);
       if (!in_coarse && !in_fine) continue;
@@ -486,14 +510,11 @@ void RunRefinement::see(std::span<const RelatedRun> runs) {
 }
 
 std::vector<Verdict> RunRefinement::verdicts() const {
-  Verdict form = fresh(kFrames), converges;
+  Verdict form = fresh(kFrames), converges, judged = fresh(kJudged);
   form.checked = frames_;
-  form.holds = fits_ && frames_ > 0;
-  if (!form.holds) {
-    form.witness.text =
-        frames_ == 0 ? "there is no frame that all runs have" : "the runs have not equally many particles";
-    return {form};
-  }
+  form.holds = wrong_.empty();
+  form.witness.text = wrong_;
+  if (!form.holds) return {form};
   converges.property = "converges";
   converges.unit = "m";
   converges.bound_source = kSource;
@@ -502,23 +523,30 @@ std::vector<Verdict> RunRefinement::verdicts() const {
     const double ratio = static_cast<double>(headers_[k + 1].steps) / static_cast<double>(headers_[k].steps);
     const double n = static_cast<double>(frames_ * headers_.back().steps);
     // Of first order the difference shrinks as the substep does; rounding is all that may be left.
-    const double bound = std::max(farthest_[k] / std::sqrt(ratio), kDeviations * headers_.back().u * extent_ *
-                                                                       (kStable * n * std::sqrt(n / 3) + std::sqrt(n)));
+    const double bound = std::max(farthest_[k] / std::sqrt(ratio), headers_.back().u * extent_ * carried_roundings(n));
     ++converges.checked;
     const double share = farthest_[k + 1] == 0 ? 0 : farthest_[k + 1] / bound;
     if (share <= worst) continue;
     worst = share;
     converges.measured = farthest_[k + 1];
     converges.bound = bound;
-    if (farthest_[k + 1] <= bound) continue;
+    if (farthest_[k + 1] <= bound && std::isfinite(bound)) continue;
     converges.holds = false;
+    if (!std::isfinite(farthest_[k + 1])) {
+      converges.witness.text = fmt::format("a particle exists with {} or with {} substeps alone", headers_[k + 1].steps,
+                                           headers_[k + 2].steps);
+      continue;
+    }
     converges.witness.text = fmt::format(
         "with {} substeps instead of {} the run moves by {:.3g} m, and it moved by {:.3g} m from {} to {}: "
         "no order of convergence",
         headers_[k + 2].steps, headers_[k + 1].steps, farthest_[k + 1], farthest_[k], headers_[k].steps,
         headers_[k + 1].steps);
   }
-  return {form, converges};
+  judged.checked = 1;
+  judged.holds = farthest_.front() > 0;
+  if (!judged.holds) judged.witness.text = "more substeps change nothing: nothing was tested";
+  return {form, converges, judged};
 }
 
 }  // namespace cutproof::oracles

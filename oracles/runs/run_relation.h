@@ -8,6 +8,7 @@
 
 #include "model/verdict.h"
 #include "oracles/runs/run.h"
+#include "oracles/runs/run_judge.h"
 #include "oracles/runs/run_map.h"
 
 namespace cutproof::oracles {
@@ -19,7 +20,7 @@ struct RelatedRun {
   bool is_new_coupling = false;
 };
 
-// What a reader of the verdicts has to know.
+// Where a comparison saw most.
 struct RelationSharpness {
   int64_t frame = -1;  // the sharpest; -1: none
   double bound = 0;    // of positions there [m]
@@ -37,13 +38,14 @@ class RunRelation {
   // which it holds.
   void permute(std::vector<int32_t> permutation);
   void weigh(std::vector<double> a, std::vector<double> b);  // masses [kg]
-  // `noise`: as many as there are noise runs. Lengths of time and blade are those of A.
+  // `noise`: as many as there are noise runs.
   void see(const RelatedRun& a, const RelatedRun& b, std::span<const RelatedRun> noise);
   // One of the runs has ended and another has not.
   void see_end_of_some(int64_t frame);
   void finish();
 
   std::vector<Verdict> verdicts() const;
+  std::vector<RunJudge::NotAsked> not_asked() const;
   std::vector<std::string> notes() const;
   RelationSharpness sharpest() const;
 
@@ -57,15 +59,19 @@ class RunRefinement {
  public:
   explicit RunRefinement(std::vector<RunHeader> headers);
   void see(std::span<const RelatedRun> runs);
+  // One of the runs has ended and another has not.
+  void see_end_of_some(int64_t frame);
   std::vector<Verdict> verdicts() const;
   std::vector<double> differences() const { return farthest_; }  // of each run from the next, at most [m]
 
  private:
+  void fail(std::string text);
+
   std::vector<RunHeader> headers_;
   std::vector<double> farthest_;
   int64_t frames_ = 0;
   double extent_ = 0;
-  bool fits_ = true;
+  std::string wrong_;  // with frames or particles; empty: nothing
 };
 
 }  // namespace cutproof::oracles

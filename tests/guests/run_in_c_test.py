@@ -14,6 +14,7 @@ import tempfile
 import unittest
 
 import numpy as np
+from run_test import JudgedRuns
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 PAGE = ROOT / "docs/reference/run.md"
@@ -23,7 +24,8 @@ C, CPP = ["-std=c99"], ["-x", "c++", "-std=c++11"]
 FAULTS = {"heals": "no coupling across pieces", "glued_by_one_node": "no coupling across pieces",
           "spin_lost": "angular momentum", "momentum_from_nothing": "linear momentum"}
 # The functions of the header are inline: a library has them under names of its own.
-LIBRARY = """#include <cutproof/run.h>
+LIBRARY = """#include <cutproof/plugin.h>
+#include <cutproof/run.h>
 size_t run_size(void) { return sizeof(cutproof_run); }
 const char* run_name(int k) { return k < CUTPROOF_RUN_ARRAYS ? cutproof_run_arrays[k].name : NULL; }
 int run_open(cutproof_run* r, const char* folder) { return cutproof_run_open(r, folder); }
@@ -72,7 +74,7 @@ class Run:
         return self.memory.value.decode()
 
 
-class WrittenInC(unittest.TestCase):
+class WrittenInC(JudgedRuns):
     @classmethod
     def setUpClass(cls):
         folder = tempfile.TemporaryDirectory(prefix="cutproof_run_in_c_")
@@ -89,18 +91,6 @@ class WrittenInC(unittest.TestCase):
             "as C++, checked": compiled(cls.built, "checked", SPRINGS, *CPP, "-O1", "-fsanitize=address,undefined",
                                         "-fno-sanitize-recover=all", "--"),
         }
-
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory(prefix="cutproof_run_in_c_")
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-
-    def check(self, path):
-        document = self.folder / "verdicts.json"
-        done = subprocess.run([os.environ["CUTPROOF"], "check", path, "--json", document], capture_output=True,
-                              text=True)
-        self.assertIn(done.returncode, (0, 1), done.stderr)
-        return done.returncode, json.loads(document.read_text()), done.stdout
 
     def test_numpy_reads_the_same_bits(self):
         random = np.random.default_rng(1)
@@ -219,14 +209,6 @@ class WrittenInC(unittest.TestCase):
         (self.folder / "gone").rmdir()
         self.assertEqual(run.put("positions", np.zeros((1, 3))), -1)
         self.assertIn("gone/000000.npz: No such file or directory", run.error)
-
-    def test_a_read_only_folder(self):
-        if os.geteuid() == 0:
-            self.skipTest("root may write everywhere")
-        self.folder.chmod(0o500)
-        run = Run(self.library, self.folder)
-        self.assertEqual(run.put("positions", np.zeros((1, 3))), -1)
-        self.assertIn("Permission denied", run.error)
 
     def test_a_full_disk_leaves_whole_files_only(self):
         """The system refuses bytes beyond a limit of files, in the midst of the values of every frame but the small."""

@@ -6,7 +6,6 @@ The environment names the program (CUTPROOF).
 import json
 import os
 import pathlib
-import resource
 import subprocess
 import sys
 import tempfile
@@ -54,13 +53,18 @@ class JudgedRuns(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.folder = pathlib.Path(folder.name)
 
-    def check(self, path):
-        """The exit status and the document."""
-        document = self.folder / "verdicts.json"
-        done = subprocess.run([os.environ["CUTPROOF"], "check", path, "--json", document], capture_output=True,
-                              text=True)
-        self.assertIn(done.returncode, (0, 1), done.stderr)
-        return done.returncode, json.loads(document.read_text()), done.stdout
+    def check(self, path, *options, env=None):
+        """The exit status, the document, and what is printed; `memory` is then the most that the program had [bytes]."""
+        document, errors = self.folder / "verdicts.json", self.folder / "errors"
+        with errors.open("w") as file:
+            program = subprocess.Popen([os.environ["CUTPROOF"], "check", path, *options, "--json", document], text=True,
+                                       stdout=subprocess.PIPE, stderr=file, env=os.environ | (env or {}))
+            with program.stdout:
+                text = program.stdout.read()
+            _, status, used = os.wait4(program.pid, 0)
+        program.returncode, self.memory = os.waitstatus_to_exitcode(status), 1024 * used.ru_maxrss
+        self.assertIn(program.returncode, (0, 1), errors.read_text())
+        return program.returncode, json.loads(document.read_text()), text
 
     def relate(self, *arguments):
         document = self.folder / "related.json"
@@ -68,20 +72,6 @@ class JudgedRuns(unittest.TestCase):
                               text=True)
         self.assertIn(done.returncode, (0, 1), done.stderr)
         return done.returncode, json.loads(document.read_text()), done.stdout
-
-    def related(self, simulator, word, *options, noise=(), bits=False):
-        """Two runs that must correspond by this map, made as a user would."""
-        scene, image = self.folder / "scene.npz", self.folder / "image.npz"
-        first = self.simulate(simulator, "first.h5", "--frames", "12", "--save-scene", scene, *options)
-        second = ["--again"] if word == "reset" else ["--frames", "12"]
-        if ":" in word or word == "permute":
-            subprocess.run([os.environ["CUTPROOF"], "relate", "--make", word, scene, image,
-                            *(f"--dimension={each}" for each in DIMENSIONS)], check=True, stdout=subprocess.DEVNULL)
-            second += ["--scene", image]
-        other = self.simulate(simulator, "second.h5", "--frames", "12", *second, *options)
-        disturbed = [self.simulate(simulator, f"noise{seed}.h5", "--frames", "12", "--disturb", seed) for seed in noise]
-        return self.relate(first, other, "--map", word, *(["--bits"] if bits else []),
-                           *(["--noise", *disturbed] if noise else []))
 
     def failed(self, document):
         return [verdict["property"] for verdict in document["verdicts"] if not verdict["holds"]]
@@ -112,6 +102,20 @@ class Runs(JudgedRuns):
                     status, document, _ = self.check(self.simulate(simulator, "run.h5", "--fault", fault))
                     self.assertEqual(status, 1)
                     self.assertIn(wanted, self.failed(document))
+
+    def related(self, simulator, word, *options, noise=(), bits=False):
+        """Two runs that must correspond by this map, made as a user would."""
+        scene, image = self.folder / "scene.npz", self.folder / "image.npz"
+        first = self.simulate(simulator, "first.h5", "--frames", "12", "--save-scene", scene, *options)
+        second = ["--again"] if word == "reset" else ["--frames", "12"]
+        if ":" in word or word == "permute":
+            subprocess.run([os.environ["CUTPROOF"], "relate", "--make", word, scene, image,
+                            *(f"--dimension={each}" for each in DIMENSIONS)], check=True, stdout=subprocess.DEVNULL)
+            second += ["--scene", image]
+        other = self.simulate(simulator, "second.h5", "--frames", "12", *second, *options)
+        disturbed = [self.simulate(simulator, f"noise{seed}.h5", "--frames", "12", "--disturb", seed) for seed in noise]
+        return self.relate(first, other, "--map", word, *(["--bits"] if bits else []),
+                           *(["--noise", *disturbed] if noise else []))
 
     def test_right_simulators_keep_every_relation(self):
         for simulator in SIMULATORS:
@@ -193,6 +197,19 @@ class Runs(JudgedRuns):
         self.assertEqual(failures(both, wrong, map="checkpoint"), ["related positions"])
         self.assertEqual(failures(both, dict(later, positions=x[2:5], time=time[2:5]), map="checkpoint"),
                          ["related frames"])
+        # The first run in many segments, the first of which alone has what is given once; disturbed runs that are short.
+        path = self.folder / "series.h5"
+        with cutproof_run.Writer(path, flush=1, gravity=[0, 0, -9.81], steps=3, spacing=0.5) as run:
+            for frame, at in enumerate(time):
+                run.frame(x[frame], time=at, groups=[[0, 1], [2, 3, 4]])
+        once = dict(gravity=[0, 0, -9.81], steps=3, spacing=0.5)
+        self.assertEqual(cutproof.relate(path, dict(later, **once), map="checkpoint").document["frames"], 4)
+        with self.assertRaises(cutproof.Failed) as caught:
+            cutproof.relate(path, dict(later, **once), map="checkpoint", noise=[dict(both, positions=x[:1], time=[0.0])])
+        self.assertIn("related frames", self.failed(caught.exception.document))
+        # One blade cuts all bodies.
+        swept = numpy.zeros((6, 1, 4, 3))
+        cutproof.relate(dict(both, blade=swept), dict(one, blade=swept), dict(other, blade=swept), map="split")
         was, path = [4, 2, 0, 1, 3], self.folder / "permuted.h5"
         with cutproof_run.Writer(path, permutation=was) as run:
             for frame, at in enumerate(time):
@@ -202,7 +219,8 @@ class Runs(JudgedRuns):
                                  ((both, dict(later, time=None)), "checkpoint", "Write time"),
                                  ((both, both), "permute", "which particle is which"),
                                  ((both, dict(both, permutation=[0, 1, 2, 2, 4])), "permute", "Name each particle once"),
-                                 ((both, dict(later, time=later["time"] + 9)), "checkpoint", "Write a longer one")):
+                                 ((both, dict(later, time=later["time"] + 9)), "checkpoint", "Write a longer one"),
+                                 ((both, dict(both, kicked=x)), "same", "Use cutproof kick")):
             with self.subTest(map=map, words=words), self.assertRaisesRegex(cutproof.Error, words):
                 cutproof.relate(*runs, map=map)
 
@@ -216,16 +234,23 @@ class Runs(JudgedRuns):
         status, document, text = self.relate(*runs, "--map", "refine")
         self.assertEqual(status, 0, text)
         self.assertGreater(document["differences"][0], 1.8 * document["differences"][1])
+        shorter = self.simulate("springs", "shorter.h5", "--frames", "3", "--scene", finer)
+        status, document, text = self.relate(*runs[:2], shorter, "--map", "refine")
+        self.assertEqual((status, self.failed(document)), (1, ["related frames"]), text)
+        for options, words in ((("--noise", shorter), "compares with no noise"), (("--bits",), "have other bits"),
+                               (("--dimension", "a=1,1,1"), "--make")):
+            done = subprocess.run([os.environ["CUTPROOF"], "relate", *runs, "--map", "refine", *options],
+                                  capture_output=True, text=True)
+            self.assertEqual(done.returncode, 2)
+            self.assertIn(words, " ".join(done.stderr.split()))
         other = self.simulate("springs", "other.h5", "--frames", "4", "--scene", finer, "--fault", "spin_lost")
         status, document, text = self.relate(*runs[:2], other, "--map", "refine")
         self.assertEqual((status, self.failed(document)), (1, ["converges"]), text)
 
     def test_continuous_integration_reads_each_property_once(self):
         path, report = self.simulate("springs", "run.h5", "--fault", "heals"), self.folder / "junit.xml"
-        done = subprocess.run([os.environ["CUTPROOF"], "check", path, "--json", self.folder / "verdicts.json", "--junit",
-                               report], capture_output=True, text=True, env=os.environ | {"GITHUB_ACTIONS": "true"})
-        self.assertEqual(done.returncode, 1, done.stderr)
-        document = json.loads((self.folder / "verdicts.json").read_text())
+        status, document, text = self.check(path, "--junit", report, env={"GITHUB_ACTIONS": "true"})
+        self.assertEqual(status, 1, text)
         cases = {case.get("name"): case for case in ElementTree.parse(report).iter("testcase")}
         judged = [verdict["property"] for verdict in document["verdicts"]]
         skipped = [one["property"] for one in document["not_judged"]]
@@ -243,7 +268,7 @@ class Runs(JudgedRuns):
         self.assertIn(f"see it again: cutproof check {path}", failure.text)
         for words in ("after skin", "backend", "1 of 1"):
             self.assertNotIn(words, failure.text)
-        notes = [line for line in done.stdout.splitlines() if line.startswith("::")]
+        notes = [line for line in text.splitlines() if line.startswith("::")]
         self.assertEqual(len(notes), len(self.failed(document)))
         self.assertIn(f"::error title=cutproof: {ACROSS}::{verdict['witness']['text']}; "
                       f"see it again: cutproof check {path}", "\n".join(notes))
@@ -300,20 +325,20 @@ class Runs(JudgedRuns):
         for scene in ("small_block", "three_cuts", "uniform_stretch"):
             with self.subTest(scene=scene):
                 path = self.folder / scene
-                subprocess.run([os.environ["CUTPROOF"], "run", ROOT / f"fixtures/scenes/{scene}.json", "--record", path], check=True,
-                               stdout=subprocess.DEVNULL)
-                document = self.folder / "verdicts.json"
-                done = subprocess.run([os.environ["CUTPROOF"], "check", path, "--as-run", "--json", document],
-                                      capture_output=True, text=True)
-                self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
-                judged = {v["property"] for v in json.loads(document.read_text())["verdicts"]}
+                subprocess.run([os.environ["CUTPROOF"], "run", ROOT / f"fixtures/scenes/{scene}.json", "--record", path],
+                               check=True, stdout=subprocess.DEVNULL)
+                status, document, text = self.check(path, "--as-run")
+                self.assertEqual(status, 0, text)
+                judged = {verdict["property"] for verdict in document["verdicts"]}
                 self.assertLessEqual({"linear momentum", "what is gone stays gone", ACROSS}, judged)
-                with h5py.File(f"{path}.cutproof.h5") as index, h5py.File(f"{path}.particles.vtkhdf", "r+") as particles:
-                    particles["VTKHDF/PointData/velocity"][index["snapshots/velocity_row"][-1]] += [0, 0, 100]
-                done = subprocess.run([os.environ["CUTPROOF"], "check", path, "--as-run", "--json", document],
-                                      capture_output=True, text=True)
-                self.assertEqual(done.returncode, 1, done.stdout + done.stderr)
-                self.assertIn("linear momentum", self.failed(json.loads(document.read_text())))
+                # What is planted is found.
+                with h5py.File(f"{path}.cutproof.h5") as index:
+                    last = index["snapshots/velocity_row"][-1]
+                with h5py.File(f"{path}.particles.vtkhdf", "r+") as particles:
+                    particles["VTKHDF/PointData/velocity"][last] += [0, 0, 100]
+                status, document, text = self.check(path, "--as-run")
+                self.assertEqual(status, 1, text)
+                self.assertIn("linear momentum", self.failed(document))
 
     def test_forms_of_a_file_have_the_same_verdicts(self):
         told = []
@@ -354,11 +379,9 @@ class Runs(JudgedRuns):
                     more["groups"] = numpy.arange(0, 2 * whole.sum() + 1, 2), springs[whole].ravel()
                 run.frame((rest + fallen).astype(numpy.float32), time=f * dt, **more,
                           velocities=numpy.broadcast_to(gravity * f * dt, rest.shape).astype(numpy.float32))
-        limit = resource.getrlimit(resource.RLIMIT_AS)
-        resource.setrlimit(resource.RLIMIT_AS, (2 << 30, limit[1]))
-        self.addCleanup(resource.setrlimit, resource.RLIMIT_AS, limit)
         status, document, text = self.check(self.folder / "run.h5")
         self.assertEqual((status, document["pieces"]["sizes"]), (0, [side**3 // 2] * 2), text)
+        self.assertLess(self.memory, 2 << 30)
 
     def test_what_does_not_fit_is_refused_by_name(self):
         x = numpy.zeros((2, 4, 3))
@@ -399,7 +422,7 @@ class Runs(JudgedRuns):
         _, document, text = self.check(self.folder / "run.npz")
         self.assertEqual(self.failed(document), ["run well formed"])
         self.assertIn("spacing = 1", text)
-        self.assertLess(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss, 500 * 1024)
+        self.assertLess(self.memory, 2 << 30)  # all pairs would take eighty times as much
 
     def test_groups_and_cells_go_on_each_by_itself(self):
         folder = self.folder / "run"

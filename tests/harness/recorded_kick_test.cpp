@@ -233,8 +233,7 @@ TEST(Kick, ThatIsFeltByLessThanASquareCanHoldIsRejected) {
   }
 }
 
-// --- A simulator that does not repeat itself
-// --------------------------------------------------------------------------------
+// --- A simulator that does not repeat itself -------------------------------------------------------------------------
 
 TEST(Kick, OfASimulatorThatRepeatsItselfHasNoBoundWhetherItSaysSoOrNot) {
   Runs runs;
@@ -293,8 +292,7 @@ TEST(Kick, ThatIsLostInNoiseFails) {
   EXPECT_THAT(verdict_on(report, "the kick was felt").witness.text, HasSubstr("noise"));
 }
 
-// --- A solver over all pieces at once
-// -----------------------------------------------------------------------------------------
+// --- A solver over all pieces at once --------------------------------------------------------------------------------
 
 // Particles 0 to 2 feel this share of the kick in every frame.
 io::ArrayFile coupled(double share) {
@@ -358,8 +356,7 @@ TEST(Kick, ToleratesNoShareOfWhatIsNotThere) {
   EXPECT_THAT(failing(judged(with(runs.file(), tolerance(1e-6)))), ElementsAre("no ghost force"));
 }
 
-// --- Several kicks, and how the kicked piece answers
-// -----------------------------------------------------------------------------------------
+// --- Several kicks, and how the kicked piece answers -----------------------------------------------------------------
 
 // Both pieces fall by themselves; each kick adds `answers[k]` to all of its piece in each frame from 4 on.
 template <class Real>
@@ -594,8 +591,7 @@ TEST(Kicks, OfARightSimulatorHoldInBothPrecisions) {
   }
 }
 
-// --- What cannot be understood
-// -----------------------------------------------------------------------------------------------
+// --- What cannot be understood ---------------------------------------------------------------------------------------
 
 TEST(Kick, ThatCannotBeUnderstoodIsRefused) {
   const auto replace = [](io::ArrayFile& file, Array array) {

@@ -1,7 +1,9 @@
 // Runs of other simulators, in segments: judged to the end, whatever their arrays hold.
-#include <algorithm>
+#include <array>
 #include <filesystem>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "harness/foreign_run.h"
 #include "model/io/array_file.h"

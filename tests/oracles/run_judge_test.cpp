@@ -127,7 +127,6 @@ TEST(RunJudge, HoldsOfABarThatIsPartedByItsBlade) {
   for (int k = 0; k < 24; ++k) EXPECT_EQ(bar.piece_of.at(at(k)), k % 6 >= 3 ? 3 : 0);
 }
 
-// Two tetrahedra share a face, whatever the order of their corners.
 // What the judge's own sums round is no fault of a run.
 TEST(RunJudge, HoldsOfManyParticles) {
   constexpr double kDt = 0.01;

@@ -249,6 +249,38 @@ TEST(RunRelation, LeavesOpenWhatDisturbedRunsDecideOtherwise) {
   EXPECT_EQ(judge("same", a, cut, {one}).failed(), Names{});
 }
 
+// A run that goes on from a checkpoint has times that were summed since the first run began.
+TEST(RunRelation, AllowsTimesTheRoundingOfAllFramesSinceTheBeginning) {
+  for (const int64_t before : {0, 1000}) {
+    const Flight a;
+    RunRelation relation(RunMap::parse("checkpoint"), a.header, a.header, 0, false);
+    for (int f = 1; f < Flight::kFrames; ++f) {
+      RelatedRun one = a.at_frame(f), other = one;
+      one.frame.index = before + f;
+      other.frame.time = *other.frame.time * (1 + 0x1p-43);  // a thousand roundings
+      relation.see(one, other, {});
+    }
+    relation.finish();
+    const std::vector<Verdict> verdicts = relation.verdicts();
+    EXPECT_EQ(verdicts.front().property, "related inputs");
+    EXPECT_EQ(verdicts.front().holds, before > 0);
+  }
+}
+
+TEST(RunRelation, NamesWhatIsNotAsked) {
+  const Flight a;
+  RunRelation relation(RunMap::parse("same"), a.header, a.header, 0, false);
+  for (int f = 0; f < Flight::kFrames; ++f) {
+    RelatedRun one = a.at_frame(f), other = one;
+    other.frame.velocities = {};
+    relation.see(one, other, {});
+  }
+  relation.finish();
+  Names names;
+  for (const RunJudge::NotAsked& each : relation.not_asked()) names.push_back(each.property);
+  EXPECT_EQ(names, (Names{"related velocities", "related spin", "related contact impulse", "related energy"}));
+}
+
 TEST(RunRelation, SaysWhereNothingWasTested) {
   EXPECT_EQ(judge("same", Flight(), Flight(), {Flight()}).failed(), Names{"noise is there"});
   Flight chaotic;
@@ -270,22 +302,32 @@ TEST(RunRelation, OfRefinementAsksForAnOrder) {
     }
     return run;
   };
-  const auto judged = [](const std::vector<Flight>& runs) {
+  // The runs end with the frames of the last of them. "" or what fails.
+  const auto failing = [](const std::vector<Flight>& runs, int frames = Flight::kFrames) {
     std::vector<RunHeader> headers;
     for (const Flight& run : runs) headers.push_back(run.header);
     RunRefinement refinement(headers);
-    for (int f = 0; f < Flight::kFrames; ++f) {
+    for (int f = 0; f < frames; ++f) {
       std::vector<RelatedRun> now;
       for (const Flight& run : runs) now.push_back(run.at_frame(f));
       refinement.see(now);
     }
-    return refinement.verdicts().back();
+    if (frames < Flight::kFrames) refinement.see_end_of_some(frames);
+    std::string failed;
+    for (const Verdict& verdict : refinement.verdicts()) failed += verdict.holds ? "" : verdict.property;
+    return failed;
   };
-  EXPECT_TRUE(judged({with_error(4, 0.4), with_error(8, 0.2), with_error(16, 0.1)}).holds);
-  EXPECT_TRUE(judged({with_error(4, 0), with_error(8, 0), with_error(16, 0)}).holds);
-  const Verdict worse = judged({with_error(4, 0.4), with_error(8, 0.2), with_error(16, 0.02)});
-  EXPECT_EQ(worse.property, "converges");
-  EXPECT_FALSE(worse.holds);
+  const std::vector<Flight> right = {with_error(4, 0.4), with_error(8, 0.2), with_error(16, 0.1)};
+  EXPECT_EQ(failing(right), "");
+  EXPECT_EQ(failing(right, 5), "related frames") << "a run is shorter";
+  EXPECT_EQ(failing({with_error(4, 0.4), with_error(8, 0.2), with_error(16, 0.02)}), "converges");
+  EXPECT_EQ(failing({with_error(4, 0), with_error(8, 0), with_error(16, 0)}), "something was judged");
+  std::vector<Flight> wrong = right;
+  wrong[1].alive[4][2] = 0;  // in the run between the others
+  EXPECT_EQ(failing(wrong), "converges");
+  wrong = right;
+  wrong[2].time[3] += 0.001;
+  EXPECT_EQ(failing(wrong), "related frames");
 }
 
 TEST(RunMap, RefusesWordsThatAreNone) {

@@ -648,8 +648,7 @@ TEST(GpuContacts, ProjectWhereTheReferenceDoes) {
   EXPECT_LE(far_apart, 4);
 }
 
-// A blade that stands obliquely 16 h from the rest position of the one particle, where positions are rounded by 2^-20
-// h.
+// A blade that stands obliquely 16 h from where the one particle rests: displacements are rounded by 2^-20 h there.
 constexpr RestPoint kOrigin = {1, {0, 0, 0}};
 constexpr PoseF kOblique = {{0, 0, 16}, {0, 1, 0}, {-0.8f, 0, 0.6f}, {0.6f, 0, 0.8f}};
 constexpr MoveF kResting = {kOblique, kOblique, 1};
