@@ -238,7 +238,7 @@ static inline int cutproof_run_number(cutproof_run* run, const char* name, doubl
   return strcmp(name, "steps") == 0 && (double)whole == x ? cutproof_run_i64(run, name, &whole, 1, 1)
                                                           : cutproof_run_f64(run, name, &x, 1, 1);
 }
-/* Words with spaces between them: free angular_momentum energy deterministic. */
+/* Words with spaces between them: free angular_momentum energy skin deterministic. */
 static inline int cutproof_run_promise(cutproof_run* run, const char* words) {
   char type[16];
   const size_t length = strlen(words);
