@@ -12,7 +12,7 @@ namespace {
 
 // Members of a struct, not arrays.
 bool is_member(const Array& array) {
-  constexpr std::string_view kMembers[] = {"spacing", "nodes", "gravity", "frame_time", "blades"};
+  constexpr std::string_view kMembers[] = {"spacing", "nodes", "gravity", "frame_time", "blades", "kick_frame"};
   return std::find(std::begin(kMembers), std::end(kMembers), array.name) != std::end(kMembers);
 }
 

@@ -39,7 +39,8 @@ constexpr std::array kBest = {std::string_view("best rotation")};
 constexpr std::array kNearest = {std::string_view("nearest rotation")};
 constexpr std::array kKeepsPrevious = {std::string_view("previous rotation kept")};
 constexpr std::array kSameBits = {std::string_view("determinism"), std::string_view("span composition")};
-constexpr std::array kNoGhostForce = {std::string_view("no ghost force")};
+constexpr std::array kNoGhostForce = {std::string_view("no ghost force"), std::string_view("the kick was felt")};
+constexpr std::array kMirror = {std::string_view("mirrored run")};
 
 constexpr std::array kWords = {
     PromiseWord{"connected", "each cluster is connected tissue", kConnected},
@@ -63,6 +64,7 @@ constexpr std::array kWords = {
                 kFreeSkin},
     PromiseWord{"same_bits", "the same input gives the same bits", kSameBits},
     PromiseWord{"no_ghost_force", "a piece that is kicked moves no other piece", kNoGhostForce},
+    PromiseWord{"mirror", "a mirrored scene gives the mirrored run", kMirror},
 };
 
 }  // namespace

@@ -23,7 +23,8 @@ using oracles::RunCoupling;
 // One run where it is, with the coupling that holds.
 class OpenRun {
  public:
-  explicit OpenRun(const std::string& path) : path_(path), frames_(io::RunSegments::of(path)) {}
+  explicit OpenRun(const std::string& path) : OpenRun(path, io::RunSegments::of(path)) {}
+  OpenRun(std::string name, io::RunSegments segments) : path_(std::move(name)), frames_(std::move(segments)) {}
 
   bool next() {
     if (!frames_.next()) return false;
@@ -217,19 +218,11 @@ JudgedRelation judge_refinement(const RelatedFiles& files, const std::function<v
   return judged;
 }
 
-}  // namespace
-
-bool JudgedRelation::holds() const {
-  return std::all_of(verdicts.begin(), verdicts.end(), [](const Verdict& verdict) { return verdict.holds; });
-}
-
-JudgedRelation judge_relation(const oracles::RunMap& map, const RelatedFiles& files,
-                              const std::function<void(int64_t)>& frame_done) {
-  if (map.name() == "refine") return judge_refinement(files, frame_done);
-  OpenRun first(files.first);
-  std::vector<std::unique_ptr<OpenRun>> others, noise;
-  for (const std::string& path : files.others) others.push_back(std::make_unique<OpenRun>(path));
-  for (const std::string& path : files.noise) noise.push_back(std::make_unique<OpenRun>(path));
+// By a map other than `refine`.
+JudgedRelation judge_related(const oracles::RunMap& map, OpenRun& first,
+                             const std::vector<std::unique_ptr<OpenRun>>& others,
+                             const std::vector<std::unique_ptr<OpenRun>>& noise, bool bits,
+                             const std::function<void(int64_t)>& frame_done) {
   Together second(others);
   std::optional<oracles::RunRelation> relation;
   JudgedRelation judged;
@@ -239,7 +232,7 @@ JudgedRelation judge_relation(const oracles::RunMap& map, const RelatedFiles& fi
     int64_t in_noise = all_next(noise);
     if (!relation) {
       if (map.name() == "checkpoint") in_noise = go_to_checkpoint(first, *others.front(), noise);
-      relation.emplace(map, first.header(), second.header(), static_cast<int>(noise.size()), files.bits);
+      relation.emplace(map, first.header(), second.header(), static_cast<int>(noise.size()), bits);
       judged.particles = first.segment().particles();
     }
     const bool all = in_first && in_others == std::ssize(others) && in_noise == std::ssize(noise);
@@ -248,7 +241,7 @@ JudgedRelation judge_relation(const oracles::RunMap& map, const RelatedFiles& fi
       break;
     }
     if (map.needs_time() && !first.where().frame.time)
-      throw InputError(files.first, "time", "A boost needs to know when frames are.", "Write time.");
+      throw InputError(first.path(), "time", "A boost needs to know when frames are.", "Write time.");
     if (judged.frames == 0) {
       if (map.name() == "permute") relation->permute(permutation_of(first, *others.front()));
       relation->weigh(first.mass(), second.mass());
@@ -265,6 +258,29 @@ JudgedRelation judge_relation(const oracles::RunMap& map, const RelatedFiles& fi
   judged.notes = relation->notes();
   judged.sharpest = relation->sharpest();
   return judged;
+}
+
+}  // namespace
+
+bool JudgedRelation::holds() const {
+  return std::all_of(verdicts.begin(), verdicts.end(), [](const Verdict& verdict) { return verdict.holds; });
+}
+
+JudgedRelation judge_relation(const oracles::RunMap& map, const RelatedFiles& files,
+                              const std::function<void(int64_t)>& frame_done) {
+  if (map.name() == "refine") return judge_refinement(files, frame_done);
+  OpenRun first(files.first);
+  std::vector<std::unique_ptr<OpenRun>> others, noise;
+  for (const std::string& path : files.others) others.push_back(std::make_unique<OpenRun>(path));
+  for (const std::string& path : files.noise) noise.push_back(std::make_unique<OpenRun>(path));
+  return judge_related(map, first, others, noise, files.bits, frame_done);
+}
+
+JudgedRelation judge_relation(const oracles::RunMap& map, io::RunSegments first, io::RunSegments second) {
+  OpenRun one("the first run", std::move(first));
+  std::vector<std::unique_ptr<OpenRun>> others;
+  others.push_back(std::make_unique<OpenRun>("the second run", std::move(second)));
+  return judge_related(map, one, others, {}, false, {});
 }
 
 }  // namespace cutproof::harness

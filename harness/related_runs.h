@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "harness/foreign_judge.h"
+#include "model/io/run_segments.h"
 #include "model/verdict.h"
 #include "oracles/runs/run_relation.h"
 
@@ -30,5 +31,7 @@ struct JudgedRelation {
 // Throws InputError where a file cannot be understood, or where a map needs what is not there.
 JudgedRelation judge_relation(const oracles::RunMap& map, const RelatedFiles& files,
                               const std::function<void(int64_t frame)>& frame_done = {});
+// Of two runs in memory. Any map but `split` and `refine`.
+JudgedRelation judge_relation(const oracles::RunMap& map, io::RunSegments first, io::RunSegments second);
 
 }  // namespace cutproof::harness

@@ -295,6 +295,8 @@ cutproof_scene scene(const cutproof_tissue& tissue) {
   s.blades = host_value("blades", 0, int32_t{0});
   if (s.blade != nullptr && s.blades > 0) s.frames = static_cast<int32_t>(s.blade->rows / s.blades);
   s.frame_time = host_value("frame_time", 0, 0.0);
+  s.kick = call.shown("kick");
+  s.kick_frame = host_value("kick_frame", 0, int32_t{-1});
   for (int axis = 0; axis < 3; ++axis) s.gravity[axis] = host_value("gravity", axis, 0.0);
   return s;
 }

@@ -142,9 +142,11 @@ class Scene:
     frame_time        float                 s
     blade             real (frames, q, 4, 3)  the quads that q strokes sweep on the way to each frame, where they lie at
                                             its end; NaN: none
+    kick              real (n, 3)           m/s, added to velocities as the way to the frame kick_frame begins
+    kick_frame        int                   -1: nothing is kicked
     """
     __slots__ = ("rest", "velocities", "mass", "held", "nodes", "edges", "tetrahedra", "hexahedra", "spacing",
-                 "gravity", "frames", "frame_time", "blade")
+                 "gravity", "frames", "frame_time", "blade", "kick", "kick_frame")
 
 
 class _Broken(Exception):
@@ -634,13 +636,14 @@ class _Guest:
         host = {array.name.decode(): self._view(array) for array in arrays}
         scene = Scene()
         for name, of in (("rest", "rest"), ("velocities", "velocity"), ("mass", "mass"), ("held", "held"),
-                         ("nodes", "node"), ("tetrahedra", "tetrahedra"), ("hexahedra", "hexahedra")):
+                         ("nodes", "node"), ("tetrahedra", "tetrahedra"), ("hexahedra", "hexahedra"), ("kick", "kick")):
             setattr(scene, name, given[of])
         first = numpy.repeat(numpy.arange(len(host["mass"]), dtype=numpy.int32), numpy.diff(host["edge_offsets"]))
         edges = numpy.stack([first, host["edge_ends"]], 1)
         edges = edges[edges[:, 0] < edges[:, 1]]
         scene.spacing, scene.frame_time = float(host["spacing"][0]), float(host["frame_time"][0])
         scene.gravity = host["gravity"].copy()
+        scene.kick_frame = int(host["kick_frame"][0])
         blade = host["blade"].reshape(-1, int(host["blades"][0]), 4, 3)
         scene.frames = len(blade)
         blade.flags.writeable = False

@@ -174,7 +174,7 @@ harness::Promises promises_of(const PluginInfo& plugin, const OperationDescripti
   if (!operation.is_simulator()) return promises;
   // Of a run the judge asks what is promised; this is left.
   promises.words = harness::Promises{}.words;
-  if (!is_promised(words, oracles::RunPromise::deterministic)) {
+  if ((scenes::scene_promises(words) >> static_cast<int>(oracles::RunPromise::deterministic) & 1u) == 0) {
     promises.words &= ~harness::parse_promises("same_bits", library, "promises");
   }
   return promises;
@@ -216,7 +216,19 @@ std::vector<Verdict> judge_answer(Guest& guest, const OperationDescription& oper
   answers.holds = true;
   answers.measured = 0;
   verdicts.insert(verdicts.begin(), answers);
-  if (!again && question.size == 0) return verdicts;
+  const auto judge_beside = [&] {
+    if (operation.judge_beside == nullptr) return;
+    const AskBeside beside = [&](const Question& next) {
+      Answer other = ask(guest, operation, next, at_end);
+      return other.kind == Answer::Kind::answered ? std::optional(std::move(other.arrays)) : std::nullopt;
+    };
+    for (Verdict& verdict : operation.judge_beside(question, answer.arrays, precision, beside))
+      verdicts.push_back(std::move(verdict));
+  };
+  if (!again && question.size == 0) {
+    judge_beside();
+    return verdicts;
+  }
   const Answer second = ask(guest, operation, question, !at_end);
   const bool answered = second.kind == Answer::Kind::answered, is_same = answered && second.arrays == answer.arrays;
   if (again) {
@@ -230,6 +242,7 @@ std::vector<Verdict> judge_answer(Guest& guest, const OperationDescription& oper
       same.witness = {};
     }
     verdicts.push_back(same);
+    if (same.holds) judge_beside();  // of who promises to repeat itself and does not, nothing more is known
   } else if (!answered) {
     verdicts.front() = of_all_cases(kAnswersProperty, "asked again: " + second.text);
   } else if (!is_same) {

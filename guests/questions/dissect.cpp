@@ -13,15 +13,9 @@
 #include "harness/foreign_run.h"
 #include "model/at.h"
 #include "model/error.h"
-#include "model/words.h"
 #include "oracles/runs/run.h"
 
 namespace cutproof::guests {
-
-bool is_promised(std::string_view words, oracles::RunPromise promise) {
-  const std::string_view wanted = oracles::kRunPromises[at(static_cast<int>(promise))];
-  return std::ranges::any_of(words_in(words), [&](std::string_view word) { return word == wanted || word == "*"; });
-}
 
 namespace {
 
@@ -93,8 +87,7 @@ std::vector<Verdict> judge_as_asked(const Scene& scene, const std::vector<io::Ar
   return {places.verdict(), velocities.verdict(), held.verdict()};
 }
 
-// One case. Relations between this run and others of the same simulator are asked beside it, where a guest can be asked
-// again (judge_answer).
+// One case.
 std::vector<Verdict> judge_scene(const Question& question, const Arrays& answers, Precision precision) {
   RunFiles run = run_files(question, answers, precision);
   if (!run.problem.empty()) return {unreadable(kAsAsked, run.problem)};
@@ -166,13 +159,14 @@ Scene part_of(const Scene& scene, std::vector<uint8_t> keep) {
   }
   Scene part = scene;
   std::vector<int32_t> number(keep.size(), -1);
-  part.rest.clear(), part.velocity.clear(), part.mass.clear(), part.held.clear(), part.node.clear();
+  part.rest.clear(), part.velocity.clear(), part.kick.clear(), part.mass.clear(), part.held.clear(), part.node.clear();
   part.edges.clear(), part.tetrahedra.clear(), part.hexahedra.clear();
   for (std::size_t i = 0; i < keep.size(); ++i) {
     if (keep[i] == 0) continue;
     number[i] = static_cast<int32_t>(part.count());
     part.rest.push_back(scene.rest[i]);
     part.velocity.push_back(scene.velocity[i]);
+    part.kick.push_back(scene.kick[i]);
     part.mass.push_back(scene.mass[i]);
     part.held.push_back(scene.held[i]);
     part.node.insert(part.node.end(), &scene.node[3 * i], &scene.node[3 * i] + 3);
@@ -266,6 +260,7 @@ const OperationDescription kDissect = {
     .draw_for = draw_scene_for,
     .as_drawn = kAsDrawn,
     .difference = difference_of_runs,
+    .judge_beside = judge_runs_beside,
     .files = files_of,
 };
 

@@ -389,6 +389,7 @@ Question draw_within(uint64_t seed, int64_t index, Precision precision, const Li
   Random random(mixed(seed, index));
   const SceneKind& kind = kSceneKinds[index % kSceneKindCount];
   Scene scene = draw_body(random, limits);
+  scene.kick.assign(scene.rest.size(), Vec3{});
   const Vec3 common = draw_motion(random, limits, scene);
   add_strokes(scene, common, kind.draw(random, scene, limits));
   Question question;
@@ -405,12 +406,8 @@ Question draw_scene(uint64_t seed, int64_t index, Precision precision) {
   return draw_within(seed, index, precision, {}, 0);
 }
 Question draw_scene_for(uint64_t seed, int64_t index, const PluginInfo& plugin) {
-  uint32_t promises = 0;
-  for (std::size_t k = 0; k < oracles::kRunPromises.size(); ++k) {
-    const bool is_given = is_promised(plugin.promises.value_or(""), static_cast<oracles::RunPromise>(k));
-    promises |= static_cast<uint32_t>(is_given) << k;
-  }
-  return draw_within(seed, index, plugin.precision, limits_of(plugin.limits, plugin.name), promises);
+  return draw_within(seed, index, plugin.precision, limits_of(plugin.limits, plugin.name),
+                     scene_promises(plugin.promises.value_or("")));
 }
 
 }  // namespace cutproof::guests::scenes

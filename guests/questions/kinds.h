@@ -33,9 +33,6 @@ class Random {
   std::mt19937_64 engine_;
 };
 
-// Whether words that a plugin promises by hold this one of runs (docs/reference/run.md); "*" is all.
-bool is_promised(std::string_view words, oracles::RunPromise promise);
-
 // Of a question about one body.
 int64_t one_body(const Question& question);
 std::string size_of_body(const Question& question);

@@ -2,6 +2,8 @@
 // are asked the same questions and judged alike.
 #pragma once
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -36,6 +38,9 @@ struct AnswerArray {
   std::string_view text;          // what it is, for a person
   bool optional = false;          // only in files: what it shows is not judged without it
 };
+
+// Asks another question of the same guest; nothing if it does not answer.
+using AskBeside = std::function<std::optional<Arrays>(const Question&)>;
 
 struct OperationDescription {
   wire::Operation number;  // the plugin's member that answers it: of a stage `run`, by way of states
@@ -73,6 +78,9 @@ struct OperationDescription {
   std::string_view as_drawn = {};
   // Where two answers to a question part first.
   std::string (*difference)(const Question& question, const Arrays& one, const Arrays& other) = nullptr;
+  // Verdicts on what is asked beside a question that was answered.
+  std::vector<Verdict> (*judge_beside)(const Question& question, const Arrays& answers, Precision precision,
+                                       const AskBeside& ask) = nullptr;
   // An answer as files of a run (docs/reference/run.md); nothing if it is none.
   std::vector<io::ArrayFile> (*files)(const Question& question, const Arrays& answers, Precision precision) = nullptr;
   bool is_simulator() const { return draw_for != nullptr; }

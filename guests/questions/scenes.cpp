@@ -100,7 +100,9 @@ Arrays arrays_of(const Scene& scene) {
           make_array("gravity", {3}, numbers_of({scene.gravity})),
           make_array("frame_time", {1}, std::vector<double>{scene.frame_time}),
           make_array("blades", {1}, std::vector<int32_t>{static_cast<int32_t>(scene.blades)}),
-          make_array("blade", {scene.frames * scene.blades, 12}, numbers_of(scene.blade))};
+          make_array("blade", {scene.frames * scene.blades, 12}, numbers_of(scene.blade)),
+          make_array("kick", {n, 3}, numbers_of(scene.kick)),
+          make_array("kick_frame", {1}, std::vector<int32_t>{static_cast<int32_t>(scene.kick_frame)})};
 }
 
 Array as_it_is_given(Array array, Precision precision) {
@@ -127,6 +129,8 @@ Scene scene_of(const Arrays& arrays) {
   scene.blades = array("blades").integer(0);
   scene.frames = array("blade").rows() / scene.blades;
   scene.blade = vectors_of(array("blade"));
+  scene.kick = vectors_of(array("kick"));
+  scene.kick_frame = array("kick_frame").integer(0);
   const auto offsets = array("edge_offsets").of<int64_t>();
   const auto ends = array("edge_ends").of<int32_t>();
   for (int32_t i = 0; i < scene.count(); ++i) {
@@ -147,7 +151,7 @@ std::string problem_of_scene(const Question& question) {
   }
   const int64_t n = rows("rest");
   if (n == 0) return "'rest' has no particle";
-  for (const char* const name : {"mass", "node", "velocity", "held"}) {
+  for (const char* const name : {"mass", "node", "velocity", "held", "kick"}) {
     if (rows(name) != n) return fmt::format("'{}' is not as long as 'rest'", name);
   }
   for (const char* const name : {"nodes", "gravity"}) {
@@ -162,7 +166,8 @@ std::string problem_of_scene(const Question& question) {
   const int64_t blades = find_array(arrays, "blades")->integer(0), swept = rows("blade");
   if (swept == 0 || swept % blades != 0) return "'blade' has no rows for each frame";
   if (swept / blades > kMostFrames) return fmt::format("'blade' has more than {} frames", kMostFrames);
-  for (const char* const name : {"rest", "mass", "velocity", "gravity"}) {
+  if (rows("kick_frame") != 1) return "'kick_frame' is not one number";
+  for (const char* const name : {"rest", "mass", "velocity", "gravity", "kick"}) {
     const auto numbers = find_array(arrays, name)->of<double>();
     if (!std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); }))
       return fmt::format("'{}' holds what is no number", name);
@@ -175,7 +180,7 @@ std::string problem_of_scene(const Question& question) {
       return fmt::format("'{}' names a particle that there is not", name);
   }
   const Array &promises = *find_array(question.known, "promises"), &cut = *find_array(question.known, "cut_resolution");
-  if (promises.rows() != 1 || promises.integer(0) < 0 || promises.integer(0) >= 1 << oracles::kRunPromises.size())
+  if (promises.rows() != 1 || promises.integer(0) < 0 || promises.integer(0) >= 2 * int64_t{kPromisesMirror})
     return "'promises' is no set of promises";
   if (cut.rows() != 1 || !(cut.number(0) >= 0) || !std::isfinite(cut.number(0))) return "'cut_resolution' is no length";
   Body body;

@@ -23,6 +23,13 @@ struct Limits {
 // Of its words. Throws InputError for one that there is not.
 Limits limits_of(const std::string& words, const std::string& plugin);
 
+// What a plugin promises of its runs, and of what is asked beside one. Their bits are in a question.
+enum : uint32_t {
+  kPromisesNoGhostForce = 1u << oracles::kRunPromises.size(),
+  kPromisesMirror = kPromisesNoGhostForce << 1
+};
+uint32_t scene_promises(std::string_view words);
+
 struct Scene {
   double h = 1;
   std::vector<Vec3> rest, velocity;           // [n]
@@ -36,6 +43,8 @@ struct Scene {
   double frame_time = 0;
   int64_t frames = 0, blades = 0;
   std::vector<Vec3> blade;  // [frames][blades][4]
+  std::vector<Vec3> kick;   // [n] [m/s] added to velocities as the way to a frame begins
+  int64_t kick_frame = -1;  // -1: none
   int64_t count() const { return std::ssize(rest); }
 };
 Arrays arrays_of(const Scene& scene);
@@ -91,5 +100,9 @@ struct RunFiles {
 };
 RunFiles run_files(const Question& question, const Arrays& answers, Precision precision);
 std::vector<io::ArrayFile> files_of(const Question& question, const Arrays& answers, Precision precision);
+
+// What is promised of other runs beside this one: with one piece kicked, and mirrored.
+std::vector<Verdict> judge_runs_beside(const Question& question, const Arrays& answers, Precision precision,
+                                       const AskBeside& ask);
 
 }  // namespace cutproof::guests::scenes

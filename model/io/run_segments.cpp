@@ -56,7 +56,7 @@ void require_equal_steps(const std::string& path, const std::vector<int64_t>& nu
     throw InputError(path, "",
                      fmt::format("Segment {:06} comes after {:06}, and {:06} is expected.", numbers[k], numbers[k - 1],
                                  numbers[k - 1] + numbers[1] - numbers[0]),
-                     "Write all segments, with consecutive numbers.");
+                     "Write all segments; their numbers ascend by equal steps.");
   }
 }
 

@@ -43,7 +43,8 @@ TEST(Dissect, ARightSimulatorHoldsInScenesOfEveryKind) {
   for (const KindSummary& kind : campaign.kinds) EXPECT_GT(kind.as_drawn, kind.questions / 4) << kind.kind;
   for (const char* const property :
        {"no coupling across pieces", "pieces coupled within", "linear momentum", "centre of mass", "angular momentum",
-        "no teleport", "run as asked", "velocities as asked", "what is held stays", "determinism"}) {
+        "no teleport", "run as asked", "velocities as asked", "what is held stays", "determinism", "no ghost force",
+        "mirrored run"}) {
     const auto& all = campaign.properties.all();
     const auto found = std::find_if(all.begin(), all.end(), [&](const auto& p) { return p.property == property; });
     ASSERT_NE(found, all.end()) << property;
@@ -63,7 +64,10 @@ TEST(Dissect, EachFaultFailsThePropertyThatIsNamed) {
                                                         {"short", "run as asked"},
                                                         {"offsets", "run as asked"},
                                                         {"index", "run well formed"},
-                                                        {"last_bit", "determinism"}};
+                                                        {"last_bit", "determinism"},
+                                                        {"unkicked", "the kick was felt"},
+                                                        {"global", "no ghost force"},
+                                                        {"handed", "mirrored run"}};
   for (const auto& [mode, property] : faults) {
     const KernelCampaign campaign = judged(mode, {.cases = 40, .simplify = 0});
     const bool is_found = std::any_of(campaign.failures.begin(), campaign.failures.end(),
@@ -124,6 +128,77 @@ TEST(Dissect, TellsWhereTwoRunsPart) {
                            given(campaign.failures.front().simplest, "blades").integer(0) -
                        1;
   EXPECT_TRUE(text.ends_with("in frame " + std::to_string(last))) << text;
+}
+
+// An answer of the right simulator, and what the judge says once an array is another one.
+struct Changed {
+  explicit Changed(Question asked) : question(std::move(asked)) {
+    Guest guest({PLUGIN_springs, "right", 20});
+    answers = ask(guest, dissect(), question, true).arrays;
+  }
+  void set(Array array) {
+    const auto known = std::ranges::find(answers, array.name, &Array::name);
+    ASSERT_NE(known, answers.end()) << array.name;
+    *known = std::move(array);
+  }
+  Verdict verdict(std::string_view property) const {
+    for (const Verdict& verdict : dissect().judge(question, answers, Precision::binary64)) {
+      if (verdict.property == property) return verdict;
+    }
+    ADD_FAILURE() << property;
+    return {};
+  }
+  Question question;
+  Arrays answers;
+};
+
+Question with_held() {
+  for (int64_t index = 0;; ++index) {
+    Question question = dissect().draw_for(3, index, with_limits(""));
+    if (given(question, "held").integer(0) != 0) return question;
+  }
+}
+
+TEST(Dissect, WhatIsHeldStaysWhileItExists) {
+  Changed changed(with_held());
+  const Array& position = *find_array(changed.answers, "run/position");
+  const int64_t rows = position.rows(), n = given(changed.question, "rest").rows();
+  std::vector<double> places(position.of<double>().begin(), position.of<double>().end());
+  std::vector<uint8_t> alive(at(rows), 1);
+  for (int64_t row = 3 * n; row < rows; row += n) places[at(3 * row)] += 1;  // of particle 0, from frame 3 on
+  changed.set(make_array("run/position", {rows, 3}, places));
+  EXPECT_FALSE(changed.verdict("what is held stays").holds);
+  for (int64_t row = 3 * n; row < rows; row += n) alive[at(row)] = 0;
+  changed.set(make_array("run/alive", {rows}, alive));
+  EXPECT_TRUE(changed.verdict("what is held stays").holds);
+}
+
+TEST(Dissect, NothingIsWorseThanAVelocityThatIsNoNumber) {
+  Changed changed(dissect().draw_for(3, 0, with_limits("no_grips")));
+  const Array& velocity = *find_array(changed.answers, "run/velocity");
+  std::vector<double> values(velocity.of<double>().begin(), velocity.of<double>().end());
+  values[0] = std::nan(""), values[3] = 1e9;
+  changed.set(make_array("run/velocity", {velocity.rows(), 3}, values));
+  const Verdict verdict = changed.verdict("velocities as asked");
+  EXPECT_FALSE(verdict.holds);
+  EXPECT_TRUE(std::isnan(verdict.measured)) << verdict.measured;
+  EXPECT_EQ(verdict.witness.particles, std::vector<int32_t>{0});
+}
+
+TEST(Dissect, AnswersThatContradictThemselvesAreRefused) {
+  const auto said = [](const Changed& changed) { return changed.verdict("run as asked").witness.text; };
+  const Question question = dissect().draw_for(3, 0, with_limits(""));
+  Changed cells(question), weights(question), negative(question);
+  cells.set(make_array("run/tetrahedra", {1, 4}, std::vector<int32_t>{0, 1, 2, 3}));
+  cells.set(make_array("run/hexahedra", {1, 8}, std::vector<int32_t>{0, 1, 2, 3, 4, 5, 6, 7}));
+  EXPECT_NE(said(cells).find("are both given"), std::string::npos) << said(cells);
+  weights.set(make_array("run/weights", {1}, std::vector<double>{1}));
+  weights.set(make_array("run/group_count", {0}, std::vector<int32_t>{}));
+  EXPECT_NE(said(weights).find("no groups are"), std::string::npos) << said(weights);
+  const int64_t frames = given(question, "blade").rows() / given(question, "blades").integer(0);
+  negative.set(make_array("run/particles", {frames}, std::vector<int32_t>(at(frames), -1)));
+  EXPECT_FALSE(said(negative).empty());
+  EXPECT_EQ(dissect().difference(question, negative.answers, Changed(question).answers), "");
 }
 
 TEST(Dissect, WhereNearlyEverythingIsRefusedNothingIsKnown) {

@@ -37,8 +37,9 @@ FAULTS = {
     "fragment": dict.fromkeys(LIMITS, WITHIN),
     "momentum_from_nothing": dict.fromkeys(LIMITS, "linear momentum") | {"tetrahedra": "mass kept"},
     "inverted": {"tetrahedra": "no inverted cell"},
-    # Of a run by itself these are right: a second run, a blade from the other side and another body show them.
+    # Of a run by itself these are right: a second run, a kick, a blade from the other side and another body show them.
     "race": dict.fromkeys(LIMITS, "determinism"),
+    "global_solver": dict.fromkeys(LIMITS, "no ghost force"),
     "mirror": dict.fromkeys(LIMITS, ACROSS),
     "reset": dict.fromkeys(LIMITS, ANSWERS),
 }
@@ -52,7 +53,7 @@ class Dissected(unittest.TestCase):
 
     def judge(self, function, limits="", **options):
         return cutproof.judge(dissect=function, **{
-            "limits": limits, "precision": "double", "promises": "free angular_momentum deterministic", "seed": SEED,
+            "limits": limits, "precision": "double", "promises": "free angular_momentum deterministic no_ghost_force mirror", "seed": SEED,
             "save": self.folder, **options})
 
     def of_gallery(self, name, fault=None, **options):
@@ -75,10 +76,19 @@ class RightSimulators(Dissected):
                 operation = self.of_gallery(name, cases=cases).operations["dissect"]
                 self.assertEqual((operation["cases"], operation["refused"]), (cases, 0))
                 judged = {each["property"]: each["judged"] for each in operation["properties"]}
-                for wanted in (ACROSS, WITHIN, "linear momentum", "angular momentum", "determinism", "cut as drawn"):
+                for wanted in (ACROSS, WITHIN, "linear momentum", "angular momentum", "determinism", "cut as drawn",
+                               "no ghost force"):
                     self.assertGreater(judged[wanted], cases // 5, wanted)
+                self.assertGreater(judged["mirrored run"], cases // 20)
                 for kind in operation["kinds"]:
                     self.assertGreater(kind["as_drawn"], 0, kind)
+
+
+    def test_a_kick_is_asked_of_who_repeats_itself(self):
+        function = scene.dissection(PROGRAMS["springs"].simulate, "global_solver")
+        operation = self.judge(function, LIMITS["springs"], cases=20, promises="no_ghost_force").operations["dissect"]
+        judged = {each["property"]: each["judged"] for each in operation["properties"]}
+        self.assertEqual(judged["no ghost force"], 0)
 
 
 class Functions(Dissected):

@@ -7,14 +7,17 @@ import ctypes
 import pathlib
 import sys
 import tempfile
+import types
 import unittest
 
 import numpy
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT / "guests" / "python"))
-sys.path.insert(0, str(ROOT / "tests" / "guests"))
+sys.path[:0] = [str(ROOT / "tests" / "guests"), str(ROOT / "guests" / "examples" / "runs")]
 import cutproof  # noqa: E402
+import scene  # noqa: E402
+import springs as simulator  # noqa: E402
 from python_test import labels_by_union_find, rotations_by_svd  # noqa: E402
 
 try:
@@ -101,6 +104,25 @@ class OnTheDevice(Judged):
         self.assertIn("components", self.fault(components=lambda t, alive: Mine(
             numpy.zeros(len(alive), dtype=numpy.int32))))
         self.assertEqual(self.fault(components=lambda t, alive: alive)["answers"], "label is bool, int32 is wanted")
+
+    def test_a_whole_simulator(self):
+        def springs(change):
+            def dissect(asked):
+                host = types.SimpleNamespace(**{name: to_host(value) if hasattr(
+                    value, "__cuda_array_interface__") else value for name in cutproof.Scene.__slots__
+                    for value in [getattr(asked, name)]})
+                for frame in scene.dissection(simulator.simulate)(host):
+                    frame = change(frame)
+                    yield {name: Mine(numpy.ascontiguousarray(value)) if isinstance(value, numpy.ndarray)
+                           and value.ndim > 0 else value for name, value in frame.items()}
+            return dissect
+
+        options = {"cases": 10, "precision": "double", "limits": "diagonals",
+                   "promises": "free angular_momentum deterministic no_ghost_force mirror"}
+        result = self.judge(dissect=springs(dict), **options).operations["dissect"]
+        self.assertEqual((result["cases"], result["refused"]), (10, 0))
+        self.assertIn("run as asked", self.fault(
+            dissect=springs(lambda frame: dict(frame, positions=frame["positions"] + 1e-3)), **options))
 
     def test_strides(self):
         def transposed(a, previous):

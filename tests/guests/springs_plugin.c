@@ -101,7 +101,14 @@ static int simulate(const cutproof_host* host, const cutproof_scene* scene, cutp
   }
   if (host->grow(host, run->steps, 1)) return 1;
   ((int64_t*)run->steps->data)[0] = steps;
+  double fastest = 0;
   for (int32_t frame = 0; frame < scene->frames; ++frame) {
+    for (int64_t k = 0; k < 3 * n && frame == scene->kick_frame && !is("unkicked"); ++k) {
+      v[k] += doubles(scene->kick)[k];
+      fastest = fmax(fastest, fabs(doubles(scene->kick)[k]));
+    }
+    /* As a solver that stops earlier where the whole scene moves faster. */
+    for (int64_t k = 0; k < 3 * n && is("global"); ++k) v[k] *= 1 + 1e-9 * fastest;
     for (int64_t step = 0; frame > 0 && step < steps; ++step) {
       memset(force, 0, (size_t)n * 3 * sizeof *force);
       for (int64_t s = 0; s < count; ++s) {
@@ -109,7 +116,8 @@ static int simulate(const cutproof_host* host, const cutproof_scene* scene, cutp
         double way[3], apart[3];
         const int32_t i = springs[s].i, j = springs[s].j;
         minus(x + 3 * j, x + 3 * i, way), minus(v + 3 * j, v + 3 * i, apart);
-        const double length = sqrt(dot(way, way)), stiffness = 2e7 * h * h * h;
+        const double length = sqrt(dot(way, way));
+        const double stiffness = 2e7 * h * h * h * (is("handed") && way[0] > 0 ? 1 + 1e-6 : 1);
         const double damping = 0.2 * sqrt(stiffness * mass[i]) * dot(apart, way) / length;
         const double pull = (stiffness * (length - springs[s].length) + damping) / length;
         for (int k = 0; k < 3; ++k) {
@@ -173,7 +181,7 @@ static const cutproof_plugin plugin = {.size = sizeof plugin,
                                        .abi = CUTPROOF_ABI,
                                        .name = "springs",
                                        .version = "1",
-                                       .promises = "free angular_momentum deterministic",
+                                       .promises = "free angular_momentum deterministic no_ghost_force mirror",
                                        .real = CUTPROOF_F64,
                                        .create = create,
                                        .limits = PLUGIN_LIMITS,

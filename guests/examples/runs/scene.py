@@ -4,7 +4,8 @@ SPDX-License-Identifier: MIT
 
 A body is a dict: rest (n, 3), nodes (n, 3), mass (n), velocities (n, 3), spacing, gravity, stiffness [Pa], frame_time
 [s], steps, kerf (what lies nearer than half of it to the blade is removed), cells (tetrahedra), and perhaps
-kick = (frame, velocity): from this frame on the piece of particle 0 is faster by that much. A blade is an array
+kick = (frame, velocity): from this frame on the piece of particle 0 is faster by that much, or each particle by its own
+of (n, 3) velocities. A blade is an array
 (frames, q, 4, 3): the quads swept in the way to each frame, where they lie at its end; NaN: none.
 """
 import argparse
@@ -121,9 +122,13 @@ def disturbed(body, frame, *arrays):
 
 
 def kicked(body, frame, v, piece):
-    """The velocities, those of the piece of particle 0 changed if this is the frame of a kick."""
+    """The velocities, changed if this is the frame of a kick."""
     when, by = body.get("kick", (-1, None))
-    return np.where((piece() == piece()[0])[:, None], v + by, v) if frame == when else v
+    if frame != when:
+        return v
+    if by.ndim == 1:
+        return np.where((piece() == piece()[0])[:, None], v + by, v)
+    return v + np.pad(by, ((0, len(v) - len(by)), (0, 0)))
 
 
 def dissection(simulate, fault=None, kerf=0.0):
@@ -133,7 +138,7 @@ def dissection(simulate, fault=None, kerf=0.0):
         body = {name: getattr(asked, name) for name in ("rest", "nodes", "mass", "velocities", "spacing", "gravity",
                                                         "frame_time", "held")}
         body.update(stiffness=2e7 * asked.spacing**2, steps=int(np.ceil(1000 * asked.frame_time)),
-                    kerf=kerf * asked.spacing, cells=asked.tetrahedra)
+                    kerf=kerf * asked.spacing, cells=asked.tetrahedra, kick=(asked.kick_frame, asked.kick))
         for frame in simulate(body, asked.blade, asked.frames, fault):
             if "labels" in frame:
                 frame["groups"] = cutproof_run.grid_groups(frame["positions"], 0, 2 * asked.spacing, "quadratic",

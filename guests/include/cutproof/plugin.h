@@ -65,6 +65,9 @@ typedef struct cutproof_scene { /* a body at rest, and what becomes of it; n par
   /* real [frames * blades x 12] m, frame by frame: the corners of what a blade sweeps on the way to a frame, where
    * that lies at its end; NaN: nothing. */
   const cutproof_array* blade;
+  /* real [n x 3] m/s, added to velocities as the way to kick_frame begins; kick_frame is -1 where nothing is. */
+  const cutproof_array* kick;
+  int32_t kick_frame;
 } cutproof_scene;
 
 typedef struct cutproof_frames { /* docs/reference/run.md; p: particles of all frames, one frame after the other */
