@@ -42,6 +42,12 @@ Verdict not_judged(const char* property, const char* why) {
   return verdict;
 }
 
+Question with_scene(Question question, const Scene& scene, Precision precision) {
+  question.given.clear();
+  for (Array& array : arrays_of(scene)) question.given.push_back(as_it_is_given(std::move(array), precision));
+  return question;
+}
+
 // How the scene fell apart, and at the end which particles are surely in which piece.
 struct Apart {
   oracles::RunPieces pieces;
@@ -102,9 +108,7 @@ std::vector<Verdict> judge_kicked(const Question& question, const std::vector<io
   if (apart.pieces.pieces < 2) return {not_judged(kGhost, "there is one piece")};
   if (kicked.kick_frame < 0) return {not_judged(kGhost, "no piece is free")};
   if (kicked.kick_frame >= scene.frames) return {not_judged(kGhost, "the last frame still cuts")};
-  Question next = question;
-  next.given.clear();
-  for (Array& array : arrays_of(kicked)) next.given.push_back(as_it_is_given(std::move(array), precision));
+  const Question next = with_scene(question, kicked, precision);
   const std::optional<Arrays> answers = ask(next);
   if (!answers) return {unreadable(kGhost, "it does not answer the scene with a kick")};
   const RunFiles with = run_files(next, *answers, precision);
@@ -178,11 +182,7 @@ Verdict judge_mirrored(const Question& question, const std::vector<io::ArrayFile
   if (apart.pieces.perhaps_cut > 0 || apart.pieces.beside > 0)
     return not_judged(kMirrored, "the blade lies within rounding of tissue");
   const Scene scene = scene_of(question.given);
-  Question next = question;
-  next.given.clear();
-  for (Array& array : arrays_of(mirrored_scene(scene)))
-    next.given.push_back(as_it_is_given(std::move(array), precision));
-  const std::optional<Arrays> answers = ask(next);
+  const std::optional<Arrays> answers = ask(with_scene(question, mirrored_scene(scene), precision));
   if (!answers) return unreadable(kMirrored, "it does not answer the mirrored scene");
   RunFiles back = run_files(question, mirrored_answers(scene, *answers), precision);
   if (!back.problem.empty()) return unreadable(kMirrored, "mirrored, " + back.problem);
