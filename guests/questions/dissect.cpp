@@ -187,6 +187,7 @@ std::vector<Question> simpler_scenes(const Question& question) {
   const Scene scene = scene_of(question.given);
   std::vector<Question> simpler;
   const auto add = [&](const Scene& other) {
+    if (is_joined_by_faces(scene.tetrahedra) && !is_joined_by_faces(other.tetrahedra)) return;
     Question next = question;
     next.given = arrays_of(other);
     if (other.count() > 0 && !(next == question) && (simpler.empty() || !(next == simpler.back())))

@@ -45,6 +45,16 @@ std::vector<std::array<int32_t, 8>> cubes_of(const Numbers& number) {
   return cubes;
 }
 
+std::vector<int32_t> tetrahedra_of(const std::vector<std::array<int32_t, 8>>& cubes) {
+  std::vector<int32_t> tetrahedra;
+  for (const auto& cube : cubes) {
+    for (const auto& corners : kTetrahedraOfCube) {
+      for (const int32_t corner : corners) tetrahedra.push_back(cube[at(corner)]);
+    }
+  }
+  return tetrahedra;
+}
+
 std::vector<SceneNode> draw_nodes(Random& random, const Limits& limits) {
   const bool by_cells = limits.cells > 0;
   const int32_t shape = random.below(10);  // 0 a wire, 1 a sheet, 2 and 3 with holes, 4 and 5 with a step, else a box
@@ -68,9 +78,10 @@ std::vector<SceneNode> draw_nodes(Random& random, const Limits& limits) {
   if (by_cells) {
     Numbers number;
     for (const SceneNode& node : nodes) number.emplace(node, static_cast<int32_t>(number.size()));
-    std::set<int32_t> corners;
-    for (const auto& cube : cubes_of(number)) corners.insert(cube.begin(), cube.end());
-    std::erase_if(nodes, [&](const SceneNode& node) { return !corners.contains(number.at(node)); });
+    const std::vector<int32_t> corners = tetrahedra_of(cubes_of(number));
+    if (!is_joined_by_faces(corners)) return box;
+    const std::set<int32_t> kept(corners.begin(), corners.end());
+    std::erase_if(nodes, [&](const SceneNode& node) { return !kept.contains(number.at(node)); });
   }
   return nodes.size() < 2 ? box : nodes;
 }
@@ -97,12 +108,9 @@ Scene draw_body(Random& random, const Limits& limits) {
     }
   }
   std::sort(scene.edges.begin(), scene.edges.end());
-  for (const auto& cube : cubes_of(number)) {
-    scene.hexahedra.insert(scene.hexahedra.end(), cube.begin(), cube.end());
-    for (const auto& corners : kTetrahedraOfCube) {
-      for (const int32_t corner : corners) scene.tetrahedra.push_back(cube[at(corner)]);
-    }
-  }
+  const auto cubes = cubes_of(number);
+  for (const auto& cube : cubes) scene.hexahedra.insert(scene.hexahedra.end(), cube.begin(), cube.end());
+  scene.tetrahedra = tetrahedra_of(cubes);
   return scene;
 }
 

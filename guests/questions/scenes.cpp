@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
+#include <map>
 
 #include "guests/tissue_arrays.h"
 #include "model/at.h"
@@ -12,6 +14,7 @@
 #include "model/counted.h"
 #include "model/error.h"
 #include "model/words.h"
+#include "oracles/support.h"
 
 namespace cutproof::guests::scenes {
 
@@ -188,6 +191,25 @@ std::string problem_of_scene(const Question& question) {
   body.edge_offsets = list_of<int64_t>(*find_array(arrays, "edge_offsets"));
   body.edge_ends = list_of<int32_t>(*find_array(arrays, "edge_ends"));
   return problem_of_edges(body);
+}
+
+bool is_joined_by_faces(const std::vector<int32_t>& tetrahedra) {
+  oracles::DisjointSets joined(std::ssize(tetrahedra) / 4);
+  std::map<std::array<int32_t, 3>, int32_t> cell_of_face;
+  std::map<int32_t, int32_t> cell_of_corner;
+  for (int32_t k = 0; k < std::ssize(tetrahedra); ++k) {
+    std::array<int32_t, 3> face;  // opposite of this corner
+    for (int32_t other = k / 4 * 4, c = 0; other < k / 4 * 4 + 4; ++other) {
+      if (other != k) face[at(c++)] = tetrahedra[at(other)];
+    }
+    std::sort(face.begin(), face.end());
+    joined.unite(k / 4, cell_of_face.emplace(face, k / 4).first->second);
+    cell_of_corner.emplace(tetrahedra[at(k)], k / 4);
+  }
+  for (int32_t k = 0; k < std::ssize(tetrahedra); ++k) {
+    if (joined.find(k / 4) != joined.find(cell_of_corner.at(tetrahedra[at(k)]))) return false;
+  }
+  return true;
 }
 
 std::string size_of_scene(const Question& question) {

@@ -63,6 +63,9 @@ struct Range {
 };
 Range range_along(const Scene& scene, Vec3 direction);
 Vec3 axis_vector(int axis);
+// Whether tetrahedra that share a corner are all joined by faces: what holds together by a node or an edge is no
+// tissue.
+bool is_joined_by_faces(const std::vector<int32_t>& tetrahedra);
 
 std::vector<std::string> scene_kinds();
 Question draw_scene(uint64_t seed, int64_t index, Precision precision);

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "guests/questions/campaign.h"
+#include "guests/questions/scenes.h"
 #include "model/at.h"
 #include "model/error.h"
 #include "model/vec.h"
@@ -294,6 +295,19 @@ TEST(Dissect, ScenesAreWithinTheLimits) {
     FAIL();
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("there is no limit 'one_knife'"), std::string::npos) << error.what();
+  }
+}
+
+TEST(Dissect, CellsThatMeetInANodeOrAnEdgeAloneAreNotAskedFor) {
+  EXPECT_TRUE(scenes::is_joined_by_faces({}));
+  EXPECT_TRUE(scenes::is_joined_by_faces({0, 1, 2, 3, 3, 1, 2, 4, 5, 6, 7, 8}));
+  EXPECT_FALSE(scenes::is_joined_by_faces({0, 1, 2, 3, 3, 4, 5, 6}));
+  EXPECT_FALSE(scenes::is_joined_by_faces({0, 1, 2, 3, 2, 3, 4, 5}));
+  for (uint64_t seed = 11; seed < 15; ++seed) {
+    for (int64_t index = 0; index < 100; ++index) {
+      const Question question = dissect().draw_for(seed, index, with_limits("cells"));
+      EXPECT_TRUE(scenes::is_joined_by_faces(scenes::scene_of(question.given).tetrahedra)) << seed << ' ' << index;
+    }
   }
 }
 
