@@ -3,7 +3,7 @@
 
 Usage: long_tests.py BUILD    the first line is a pattern of those that are left out (ctest -E), the second for a person
 
-The commit's hash chooses every SHARE-th, so that a day of commits runs all of them. Each row says what no shorter test
+The commit's hash chooses every SHARE-th. Each row says what no shorter test
 finds. Every mutant is expected to be found by a test that is none of them. Outside a repository all are run.
 """
 import json
@@ -12,13 +12,13 @@ import re
 import subprocess
 import sys
 
-SHARE = 32
+SHARE = 128
 LONG = (
     (r"Independent\.TrajectoriesAndOrders", "a step that program and reference both have wrong; orders of convergence"),
     (r"Packaging\.(subdirectory|archive)", "that others' projects can build with the libraries, as folder or package"),
     (r"OfThePaper/Scene\.Holds/.*", "faults where clusters and particles are many; what the paper's scenes come to"),
     (r"Organs/.*", "a mesh of others that cannot be repaired, or a scene on it that fails"),
-    (r".*SavedCounterexamples/simulated_.*", "an order of threads in which a saved case fails again"),
+    (r".*SavedCounterexamples/(simulated|host)_.*", "an order of threads in which a saved case fails again"),
     (r"Over/LargeBodies\..*/host_blocks", "room for lists that runs out in blocks of threads alone"),
     (r"PluginBackend\.IsFoundAndSimplifiedWhereOneStageIsWrong", "a guest's wrong stage that is not simplified"),
     (r"RepairOfOne\.(MakesEveryOutsideMeshASolid|JoinsTwoOfVeryManyParts)", "a mesh that is repaired wrongly, or slowly"),
@@ -27,9 +27,13 @@ LONG = (
     (r"Programs/Allocations\..*", "what a verb does wrongly when memory ends at some allocation of a whole run"),
     (r"Program\.CheckGivesTheVerdictsThatTheRunGave", "a judge that needs more than a recording keeps"),
     (r"Program\.LetsTheRestOfTheKidneyEndWithTheSameBits.*", "a ghost force by the bits of a whole scene"),
-    (r"Report\.(InABrowser|ScenesInABrowser|HowFast|OfStoredResults)", "what a page draws, what a click does, its pace"),
+    (r"Report\.(InABrowser|ScenesInABrowser|RunsInABrowser|HowFast|OfStoredResults)", "what a page draws, what a click does, its pace"),
     (r"(PythonWithCudaStandIn\.Arrays|SciPy\.Judged)", "answers in a device's memory; a library that stops to hold"),
-    (r"Runs\.DissectedWithFaults", "a fault of a simulator that no drawn scene shows, or that is not shrunk"),
+    (r"Runs\.DissectedWithFaults/.*", "a fault of a simulator that no drawn scene shows, or that is not shrunk"),
+    (r"Runs\.JudgedWithFaults", "a fault of a simulator that no property and no relation of a run shows"),
+    (r".*HistoriesOfCommands/simulated_.*", "an order of threads in which a history of commands breaks a promise"),
+    (r"ScenesOfTheProject\..*", "a scene of the project whose substeps do not suffice"),
+    (r"AgainstTheReference\.TheReferenceDeviates.*", "a comparison that finds differences where there is none"),
     (r"(Vectors\.ThatThePageAnswersHold|Tutorial\.FromAFailingCutToTheFix)", "programs of a page that no longer run"),
     (r"(BenchSensitivity|BenchSampling)\.HasARowForEach.*|BenchBaselines\.TellsOfEveryMethodWhatItCosts"
      r"|Bench\.ReproducesTable1.*", "a row of a suite that is missing or wrong"),

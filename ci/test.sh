@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs what is missing, builds, runs every test, and of the long ones a share that the commit chooses
 # (ci/long_tests.py). The last line is "N passed, N failed, N skipped".
-# CUTPROOF_WHOLE=1: all of the long ones, four times as many random cases, and kernels for every GPU (ci/nightly.sh).
+# CUTPROOF_WHOLE=1: all of the long ones, eight times as many random cases, and kernels for every GPU (ci/nightly.sh).
 # CUTPROOF_MESHES: a folder with outside meshes; tests on them say so when it is unset.
 # CUTPROOF_PRESET: another preset of CMakePresets.json (debug, asan, tsan).
 set -euo pipefail
@@ -11,11 +11,14 @@ preset=${CUTPROOF_PRESET:-default}
 ci/install.sh tests browser
 werror=()
 [ "${CI:-}" = true ] && werror=(-DCUTPROOF_WERROR=ON)
-# Where no GPU can run them, kernels are compiled for one kind alone.
+# Where no GPU can run them, kernels are compiled for one kind alone, as fast as that goes.
 kernels=(-UCMAKE_CUDA_ARCHITECTURES)
 if [ "${CUTPROOF_WHOLE:-}" != 1 ]; then
-  export CUTPROOF_CASES=${CUTPROOF_CASES:-500}
-  [ -e /dev/nvidiactl ] || kernels=(-DCMAKE_CUDA_ARCHITECTURES=90a-real)
+  export CUTPROOF_CASES=${CUTPROOF_CASES:-250}
+  if [ ! -e /dev/nvidiactl ]; then
+    kernels=(-DCMAKE_CUDA_ARCHITECTURES=90a-real)
+    ! nvcc --help 2>/dev/null | grep -q -- --Ofast-compile || kernels+=("-DCMAKE_CUDA_FLAGS=--Ofast-compile=max")
+  fi
 fi
 cmake --preset "$preset" --no-warn-unused-cli -DBUILD_TESTING=ON "${werror[@]}" "${kernels[@]}" >/dev/null
 build=build/$preset

@@ -1,6 +1,8 @@
 """Runs of the simulators in guests/examples/runs, judged by the program: right ones hold, and each fault that one run
 shows fails the property that is named here, each that two runs show a relation.
 
+Usage: run_test.py           right simulators, and what a run may look like
+       run_test.py Faults    every fault fails what is named here
 The environment names the program (CUTPROOF).
 """
 import json
@@ -77,31 +79,14 @@ class JudgedRuns(unittest.TestCase):
         return [verdict["property"] for verdict in document["verdicts"] if not verdict["holds"]]
 
 
-class Runs(JudgedRuns):
+class Simulated(JudgedRuns):
+    """Runs of the gallery."""
+
     def simulate(self, simulator, name="run.h5", *options):
         path = self.folder / name
         subprocess.run(["/usr/bin/python3", "-B", ROOT / f"guests/examples/runs/{simulator}.py", path, *options],
                        check=True, stdout=subprocess.DEVNULL)
         return path
-
-    def test_right_simulators_hold(self):
-        for simulator in SIMULATORS:
-            for seed in ("1", "2"):
-                with self.subTest(simulator=simulator, seed=seed):
-                    status, document, text = self.check(self.simulate(simulator, "run.h5", "--seed", seed))
-                    self.assertEqual(status, 0, text)
-                    self.assertEqual(document["pieces"]["sure"], 2, text)
-                    self.assertEqual(document["pieces"]["coupled"], 2, text)
-                    for wanted in (ACROSS, WITHIN, "linear momentum", "centre of mass", "angular momentum"):
-                        self.assertIn(wanted, [verdict["property"] for verdict in document["verdicts"]])
-
-    def test_faults_fail_the_property_that_is_named(self):
-        for fault, by_simulator in FAULTS.items():
-            for simulator, wanted in by_simulator.items():
-                with self.subTest(fault=fault, simulator=simulator):
-                    status, document, _ = self.check(self.simulate(simulator, "run.h5", "--fault", fault))
-                    self.assertEqual(status, 1)
-                    self.assertIn(wanted, self.failed(document))
 
     def related(self, simulator, word, *options, noise=(), bits=False):
         """Two runs that must correspond by this map, made as a user would."""
@@ -117,6 +102,19 @@ class Runs(JudgedRuns):
         return self.relate(first, other, "--map", word, *(["--bits"] if bits else []),
                            *(["--noise", *disturbed] if noise else []))
 
+
+class Runs(Simulated):
+    def test_right_simulators_hold(self):
+        for simulator in SIMULATORS:
+            for seed in ("1", "2"):
+                with self.subTest(simulator=simulator, seed=seed):
+                    status, document, text = self.check(self.simulate(simulator, "run.h5", "--seed", seed))
+                    self.assertEqual(status, 0, text)
+                    self.assertEqual(document["pieces"]["sure"], 2, text)
+                    self.assertEqual(document["pieces"]["coupled"], 2, text)
+                    for wanted in (ACROSS, WITHIN, "linear momentum", "centre of mass", "angular momentum"):
+                        self.assertIn(wanted, [verdict["property"] for verdict in document["verdicts"]])
+
     def test_right_simulators_keep_every_relation(self):
         for simulator in SIMULATORS:
             others = ("same", "reset", "rotate:90z") if simulator == "springs" else ()
@@ -128,25 +126,6 @@ class Runs(JudgedRuns):
                     self.assertIn("related coupling", [verdict["property"] for verdict in document["verdicts"]])
         status, _, text = self.related("springs", "permute", noise=("1", "2"))
         self.assertEqual(status, 0, text)
-
-    def test_faults_fail_the_relation_that_is_named(self):
-        for fault, (word, wanted) in RELATED.items():
-            with self.subTest(fault=fault):
-                status, document, text = self.related("springs", word, "--fault", fault, bits=wanted == "same bits")
-                self.assertEqual(status, 1, text)
-                self.assertIn(wanted, self.failed(document), text)
-                report = self.folder / "related.xml"
-                self.relate(self.folder / "first.h5", self.folder / "second.h5", "--map", word, "--junit", report)
-                names = [case.get("name") for case in ElementTree.parse(report).iter("testcase")]
-                self.assertIn("related positions", names)
-        # A right run beside one whose square roots are of single precision: as a GPU beside its CPU.
-        right = self.simulate("springs", "first.h5", "--frames", "12")
-        rough = self.simulate("springs", "second.h5", "--frames", "12", "--fault", "noise")
-        noise = [self.simulate("springs", f"noise{seed}.h5", "--frames", "12", "--disturb", seed) for seed in "12"]
-        status, document, text = self.relate(right, rough, "--map", "same", "--noise", *noise)
-        self.assertEqual(status, 1, text)
-        self.assertIn("related positions", self.failed(document))
-        self.assertGreater(document["sharpest"]["moved"], 1e10 * document["sharpest"]["bound"])
 
     def test_relations_of_arrays_in_memory(self):
         scene = {"rest": numpy.random.default_rng(1).random((6, 3)), "gravity": numpy.array([0, 0, -9.81]),
@@ -437,5 +416,34 @@ class Runs(JudgedRuns):
         self.assertEqual([v["checked"] for v in inverted], [3])
 
 
+class Faults(Simulated):
+    def test_faults_fail_the_property_that_is_named(self):
+        for fault, by_simulator in FAULTS.items():
+            for simulator, wanted in by_simulator.items():
+                with self.subTest(fault=fault, simulator=simulator):
+                    status, document, _ = self.check(self.simulate(simulator, "run.h5", "--fault", fault))
+                    self.assertEqual(status, 1)
+                    self.assertIn(wanted, self.failed(document))
+
+    def test_faults_fail_the_relation_that_is_named(self):
+        for fault, (word, wanted) in RELATED.items():
+            with self.subTest(fault=fault):
+                status, document, text = self.related("springs", word, "--fault", fault, bits=wanted == "same bits")
+                self.assertEqual(status, 1, text)
+                self.assertIn(wanted, self.failed(document), text)
+                report = self.folder / "related.xml"
+                self.relate(self.folder / "first.h5", self.folder / "second.h5", "--map", word, "--junit", report)
+                names = [case.get("name") for case in ElementTree.parse(report).iter("testcase")]
+                self.assertIn("related positions", names)
+        # A right run beside one whose square roots are of single precision: as a GPU beside its CPU.
+        right = self.simulate("springs", "first.h5", "--frames", "12")
+        rough = self.simulate("springs", "second.h5", "--frames", "12", "--fault", "noise")
+        noise = [self.simulate("springs", f"noise{seed}.h5", "--frames", "12", "--disturb", seed) for seed in "12"]
+        status, document, text = self.relate(right, rough, "--map", "same", "--noise", *noise)
+        self.assertEqual(status, 1, text)
+        self.assertIn("related positions", self.failed(document))
+        self.assertGreater(document["sharpest"]["moved"], 1e10 * document["sharpest"]["bound"])
+
+
 if __name__ == "__main__":
-    unittest.main(verbosity=2)
+    unittest.main(verbosity=2, defaultTest="Runs")
