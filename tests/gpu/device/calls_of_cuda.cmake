@@ -6,7 +6,7 @@ endif()
 # These do not fail, or are done once in a process by what the compiler writes.
 set(known ${CALLS} cudaGetErrorName cudaGetErrorString __cudaGetKernel __cudaPopCallConfiguration
   __cudaPushCallConfiguration __cudaRegisterFatBinary __cudaRegisterFatBinaryEnd __cudaRegisterFunction
-  __cudaRegisterVar __cudaUnregisterFatBinary)
+  __cudaInitModule __cudaRegisterVar __cudaUnregisterFatBinary)
 string(REGEX MATCHALL " U [_]*cuda[A-Za-z0-9_]+" found "${symbols}")
 list(TRANSFORM found REPLACE "^ U " "")
 list(REMOVE_DUPLICATES found)
