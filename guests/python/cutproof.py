@@ -241,7 +241,8 @@ def _run_of(frames, wanted, real, device):
         strange = set(frame) - set(_OF_FRAME) - _IGNORED - {"groups", "cells"}
         if strange:
             raise _Broken(f"frame {f} holds {min(strange)}, which is not known")
-        n = len(frame["positions"])
+        frame = dict(frame, positions=_on_host(frame["positions"], f"positions of frame {f}", device))
+        n = len(frame["positions"]) if frame["positions"].ndim else 0
         counts.append(n)
         if "removed" in frame and "alive" not in frame:
             frame = dict(frame, alive=~_on_host(frame["removed"], f"removed of frame {f}", device).astype(bool))
