@@ -94,7 +94,10 @@ Scene kicked_scene(const Scene& scene, const Apart& apart) {
       inside / std::max(1.0, static_cast<double>(scene.count()) - others) - outside / std::max(1.0, others);
   const Vec3 direction = norm(away) > 0 ? normalized(away) : Vec3{1, 0, 0};
   for (const int32_t i : smallest->second) kicked.kick[at(i)] = direction * (0.1 * scene.h / scene.frame_time);
-  kicked.kick_frame = apart.pieces.last_cut + 1;
+  // Once no blade is there: what else it cuts depends on where the pieces are.
+  for (std::size_t k = 0; k < scene.blade.size(); ++k) {
+    if (std::isfinite(scene.blade[k].x)) kicked.kick_frame = static_cast<int64_t>(k) / (4 * scene.blades) + 1;
+  }
   return kicked;
 }
 
@@ -107,7 +110,7 @@ std::vector<Verdict> judge_kicked(const Question& question, const std::vector<io
   const Scene scene = scene_of(question.given), kicked = kicked_scene(scene, apart);
   if (apart.pieces.pieces < 2) return {not_judged(kGhost, "there is one piece")};
   if (kicked.kick_frame < 0) return {not_judged(kGhost, "no piece is free")};
-  if (kicked.kick_frame >= scene.frames) return {not_judged(kGhost, "the last frame still cuts")};
+  if (kicked.kick_frame >= scene.frames) return {not_judged(kGhost, "a blade is there in the last frame")};
   const Question next = with_scene(question, kicked, precision);
   const std::optional<Arrays> answers = ask(next);
   if (!answers) return {unreadable(kGhost, "it does not answer the scene with a kick")};
