@@ -13,7 +13,7 @@ cd "$(dirname "$0")/.."
 
 program=(
   g++ cmake ninja-build
-  libeigen3-dev libsuitesparse-dev libcgal-dev libboost-dev libboost-context-dev libhdf5-dev libzip-dev zlib1g-dev
+  libeigen3-dev libsuitesparse-dev libcgal-dev libboost-dev libboost-context-dev libhdf5-dev zlib1g-dev
   nlohmann-json3-dev libfmt-dev libcli11-dev
   python3 esbuild libjs-three  # report pages
 )

@@ -24,7 +24,7 @@ set(needs_fmt::fmt "find_dependency(fmt)")
 set(needs_Threads::Threads "find_dependency(Threads)")
 set(needs_Boost::context "find_dependency(Boost 1.74 COMPONENTS context)")
 set(needs_hdf5::hdf5 "find_dependency(HDF5 COMPONENTS C)")
-set(needs_Libzip::zip "include(\${CMAKE_CURRENT_LIST_DIR}/Libzip.cmake)")
+set(needs_ZLIB::ZLIB "find_dependency(ZLIB)")
 set(needs_CGAL::CGAL "find_dependency(CGAL 5.5)")
 foreach(part cholmod spqr btf)
   set(needs_SuiteSparse::${part} "include(\${CMAKE_CURRENT_LIST_DIR}/SuiteSparse.cmake)")
@@ -91,7 +91,6 @@ if(CUTPROOF_INSTALL)
     ${CMAKE_CURRENT_BINARY_DIR}/package/cutproof-config.cmake
     ${CMAKE_CURRENT_BINARY_DIR}/package/cutproof-config-version.cmake
     ${CMAKE_CURRENT_LIST_DIR}/SuiteSparse.cmake
-    ${CMAKE_CURRENT_LIST_DIR}/Libzip.cmake
     ${CMAKE_CURRENT_LIST_DIR}/CutproofTest.cmake
     DESTINATION ${package_folder})
   if(CUTPROOF_PROGRAM)

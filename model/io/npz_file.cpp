@@ -1,14 +1,9 @@
-// NPZ: a ZIP archive of .npy files (numpy.lib.format). Only the archive is libzip's.
+// NPZ: a ZIP archive of .npy files (numpy.lib.format).
 #include <fmt/format.h>
-#include <zip.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <cstring>
-#include <fstream>
 #include <limits>
-#include <memory>
-#include <new>
 #include <optional>
 #include <string_view>
 
@@ -16,6 +11,7 @@
 #include "model/io/array_parts.h"
 #include "model/io/atomic_file.h"
 #include "model/io/input_file.h"
+#include "model/io/zip_archive.h"
 
 namespace cutproof::io {
 namespace {
@@ -24,22 +20,7 @@ constexpr const char* kNpzRemedy = "Write the file once more with numpy.savez or
 constexpr std::string_view kMagic = "\x93NUMPY";
 // Deflate shrinks by at most 1032.
 constexpr uint64_t kMostDeflation = 1100;
-constexpr std::size_t kZipNeeds = std::size_t{1} << 20;  // to open an archive of few files; more than it takes
 constexpr std::size_t kMostHeaderBytes = std::size_t{1} << 16;
-
-struct Discard {
-  void operator()(zip_t* archive) const { zip_discard(archive); }
-  void operator()(zip_file_t* file) const { zip_fclose(file); }
-  void operator()(zip_source_t* source) const { zip_source_free(source); }
-};
-using Archive = std::unique_ptr<zip_t, Discard>;
-using Entry = std::unique_ptr<zip_file_t, Discard>;
-
-// What libzip says, as bad input; a lack of memory as what it is.
-std::string zip_reason(zip_error_t* error) {
-  if (zip_error_code_zip(error) == ZIP_ER_MEMORY) throw std::bad_alloc();
-  return zip_error_strerror(error);
-}
 
 // --- The header of a .npy file
 // -----------------------------------------------------------------------------------------
@@ -146,32 +127,6 @@ std::optional<NpyHeader> read_header(std::string_view text) {
   return header;
 }
 
-// How many files an archive says at its end that it has; nothing if it has no such end, of which libzip says more.
-// libzip takes seconds for a directory of hundreds of thousands before it says how many they are.
-std::optional<uint64_t> count_of_archive(const std::string& path, uint64_t file_bytes) {
-  constexpr uint64_t kEnd = 22, kLongestComment = 65535, kLocator = 20;
-  const uint64_t bytes = std::min(file_bytes, kEnd + kLongestComment + kLocator);
-  std::string tail(bytes, '\0');
-  std::ifstream file(path, std::ios::binary);
-  const auto read_at = [&](uint64_t at, char* to, uint64_t size) {
-    file.seekg(static_cast<std::streamoff>(at));
-    file.read(to, static_cast<std::streamsize>(size));
-    return file.good();
-  };
-  if (bytes < kEnd || !read_at(file_bytes - bytes, tail.data(), bytes)) return std::nullopt;
-  const std::size_t end = tail.rfind("PK\x05\x06", bytes - kEnd);
-  if (end == std::string::npos) return std::nullopt;
-  uint16_t count = 0;
-  std::memcpy(&count, tail.data() + end + 10, sizeof count);
-  if (count != 0xFFFF) return count;
-  // More than that, or a large archive: a further end says it, and a locator before this end where that lies.
-  if (end < kLocator || tail.compare(end - kLocator, 4, "PK\x06\x07") != 0) return count;
-  uint64_t at = 0, large_count = 0;
-  std::memcpy(&at, tail.data() + end - kLocator + 8, sizeof at);
-  if (at > file_bytes || !read_at(at + 32, reinterpret_cast<char*>(&large_count), sizeof large_count)) return count;
-  return large_count;
-}
-
 // Numbers of `each` bytes that lie column by column, the first index running fastest, row by row.
 std::vector<std::byte> row_by_row(const std::vector<std::byte>& columns, const std::vector<int64_t>& shape,
                                   std::size_t each) {
@@ -198,28 +153,26 @@ class NpzReader {
   explicit NpzReader(const std::string& path) : path_(path), found_(path, require_regular_file(path)) {}
 
   ArrayFile read() {
-    require_few(count_of_archive(path_, require_regular_file(path_)).value_or(0));
-    // libzip 1.7 says of some allocations that fail that this is no archive. So what it needs is asked for before, and
-    // what it says is believed when it says it twice.
-    int code = 0;
-    for (int attempt = 0; attempt < 2 && archive_ == nullptr; ++attempt) {
-      void* volatile block = std::malloc(kZipNeeds);  // volatile: or the compiler would see that nobody uses it
-      if (block == nullptr) throw std::bad_alloc();
-      std::free(block);
-      archive_.reset(zip_open(path_.c_str(), ZIP_RDONLY | ZIP_CHECKCONS, &code));
+    try {
+      archive_.emplace(path_);
+      if (archive_->count() > kMostArrays) {
+        refuse("", fmt::format("There are {} arrays, more than {}.", archive_->count(), kMostArrays),
+               "Write only those that are to be read.");
+      }
+      entries_ = archive_->entries();
+    } catch (const DamagedArchive& error) {
+      refuse("", fmt::format("The archive cannot be read: {}.", error.what()), kNpzRemedy);
     }
-    if (archive_ == nullptr) {
-      zip_error_t error;
-      zip_error_init_with_code(&error, code);
-      const std::string why = zip_reason(&error);
-      zip_error_fini(&error);
-      refuse("", fmt::format("The archive cannot be read: {}.", why), kNpzRemedy);
-    }
-    const zip_int64_t count = zip_get_num_entries(archive_.get(), 0);
-    require_few(static_cast<uint64_t>(count));
     // The directory says how large everything is: what is too large is refused before any of it is inflated.
-    for (zip_int64_t k = 0; k < count; ++k) require_size_of_entry(static_cast<zip_uint64_t>(k));
-    for (zip_int64_t k = 0; k < count; ++k) read_entry(static_cast<zip_uint64_t>(k));
+    for (const ZipEntry& entry : entries_) require_size_of(entry);
+    for (const ZipEntry& entry : entries_) {
+      name_ = entry.name;
+      try {
+        read_entry(entry);
+      } catch (const DamagedArchive& error) {
+        refuse(name_, fmt::format("It is damaged: {}.", error.what()), kNpzRemedy);
+      }
+    }
     return found_.take();
   }
 
@@ -228,73 +181,38 @@ class NpzReader {
     throw InputError(path_, name, problem, remedy);
   }
 
-  void require_few(uint64_t count) const {
-    if (count <= kMostArrays) return;
-    refuse("", fmt::format("There are {} arrays, more than {}.", count, kMostArrays),
-           "Write only those that are to be read.");
-  }
-
-  zip_stat_t stat(zip_uint64_t index) {
-    zip_stat_t stat;
-    zip_stat_init(&stat);
-    constexpr zip_uint64_t kNeeded = ZIP_STAT_NAME | ZIP_STAT_SIZE | ZIP_STAT_COMP_SIZE | ZIP_STAT_COMP_METHOD;
-    if (zip_stat_index(archive_.get(), index, 0, &stat) != 0 || (stat.valid & kNeeded) != kNeeded) {
-      refuse("", "The archive's directory is damaged.", kNpzRemedy);
-    }
-    return stat;
-  }
-
-  void require_size_of_entry(zip_uint64_t index) {
-    const zip_stat_t entry = stat(index);
-    const std::string name = entry.name;
-    if (entry.comp_method != ZIP_CM_STORE && entry.comp_method != ZIP_CM_DEFLATE) {
+  void require_size_of(const ZipEntry& entry) {
+    const std::string& name = entry.name;
+    if (entry.method != kZipStored && entry.method != kZipDeflated) {
       refuse(name, "It is compressed in a way that numpy does not know.", kNpzRemedy);
     }
-    if ((entry.valid & ZIP_STAT_ENCRYPTION_METHOD) != 0 && entry.encryption_method != ZIP_EM_NONE) {
-      refuse(name, "It is encrypted.", kNpzRemedy);
-    }
-    if (entry.size / kMostDeflation > entry.comp_size + 1) {
-      refuse(name, fmt::format("It claims {} bytes, and {} are stored for it.", entry.size, entry.comp_size),
+    if (entry.encrypted) refuse(name, "It is encrypted.", kNpzRemedy);
+    if (entry.bytes / kMostDeflation > entry.stored_bytes + 1) {
+      refuse(name, fmt::format("It claims {} bytes, and {} are stored for it.", entry.bytes, entry.stored_bytes),
              kNpzRemedy);
     }
     // Headers are small, so that these may be counted as arrays.
-    found_.require_sum(name, entry.size > kMostArrayBytes ? entry.size : bytes_ += entry.size);
+    found_.require_sum(name, entry.bytes > kMostArrayBytes ? entry.bytes : bytes_ += entry.bytes);
   }
 
-  void read_entry(zip_uint64_t index) {
-    const zip_stat_t entry = stat(index);
-    name_ = entry.name;
+  void read_entry(const ZipEntry& entry) {
     if (!name_.ends_with(".npy")) {
       refuse(name_, "This is no array: its name does not end in \".npy\".", kNpzRemedy);
     }
     name_.resize(name_.size() - 4);
-    file_.reset(zip_fopen_index(archive_.get(), index, 0));
-    if (file_ == nullptr) {
-      refuse(name_, fmt::format("It cannot be read: {}.", zip_reason(zip_get_error(archive_.get()))), kNpzRemedy);
-    }
-    uint64_t left = entry.size;
+    archive_->open(entry);
+    uint64_t left = entry.bytes;
     const NpyHeader header = read_npy_header(left);
     read_values(header, left);
     // Reading on to the end is what checks the sum.
     char more;
-    if (const zip_int64_t n = zip_fread(file_.get(), &more, 1); n != 0) {
-      refuse(name_, n > 0 ? "It goes on after its end." : fmt::format("It is damaged: {}.", why_not_read()),
-             kNpzRemedy);
-    }
+    if (archive_->read(&more, 1) != 0) refuse(name_, "It goes on after its end.", kNpzRemedy);
   }
-
-  std::string why_not_read() { return zip_reason(zip_file_get_error(file_.get())); }
 
   // Exactly so many bytes, of which `left` are left.
   void take(void* to, uint64_t bytes, uint64_t& left) {
-    if (bytes > left) refuse(name_, "It is cut off.", kNpzRemedy);
+    if (bytes > left || archive_->read(to, bytes) < bytes) refuse(name_, "It is cut off.", kNpzRemedy);
     left -= bytes;
-    for (uint64_t done = 0; done < bytes;) {
-      const zip_int64_t n = zip_fread(file_.get(), static_cast<char*>(to) + done, bytes - done);
-      if (n < 0) refuse(name_, fmt::format("It is damaged: {}.", why_not_read()), kNpzRemedy);
-      if (n == 0) refuse(name_, "It is cut off.", kNpzRemedy);
-      done += static_cast<uint64_t>(n);
-    }
   }
 
   NpyHeader read_npy_header(uint64_t& left) {
@@ -394,8 +312,8 @@ class NpzReader {
 
   std::string path_;
   ArrayCollector found_;
-  Archive archive_;
-  Entry file_;          // closed before the archive
+  std::optional<ZipReader> archive_;
+  std::vector<ZipEntry> entries_;
   std::string name_;    // of the array that is read
   uint64_t bytes_ = 0;  // as the directory says, of all so far
 };
@@ -432,53 +350,15 @@ std::string npy_of(const NamedText& text) {
   return npy_of(fmt::format("<U{}", length), {}, letters);
 }
 
-// Throws what a failing call of libzip means, which writes into memory here.
-void require_zip(bool success, zip_error_t* error, const std::string& path) {
-  if (!success) throw MachineError(fmt::format("{}: The archive could not be made: {}.", path, zip_reason(error)));
-}
-
 }  // namespace
 
 ArrayFile read_npz(const std::string& path) { return NpzReader(path).read(); }
 
 void write_npz(const std::string& path, const ArrayFile& contents) {
-  std::vector<std::pair<std::string, std::string>> entries;  // names and bytes, which libzip reads when it closes
+  std::vector<std::pair<std::string, std::string>> entries;
   for (const Array& array : contents.arrays) entries.emplace_back(array.name + ".npy", npy_of(array));
   for (const NamedText& text : contents.texts) entries.emplace_back(text.name + ".npy", npy_of(text));
-
-  zip_error_t error;
-  zip_error_init(&error);
-  const std::unique_ptr<zip_source_t, Discard> bytes(zip_source_buffer_create(nullptr, 0, 0, &error));
-  require_zip(bytes != nullptr, &error, path);
-  zip_source_keep(bytes.get());
-  Archive archive(zip_open_from_source(bytes.get(), ZIP_TRUNCATE, &error));
-  if (archive == nullptr) zip_source_free(bytes.get());
-  require_zip(archive != nullptr, &error, path);
-  zip_error_t* const why = zip_get_error(archive.get());
-  for (const auto& [name, npy] : entries) {
-    zip_source_t* const source = zip_source_buffer(archive.get(), npy.data(), npy.size(), 0);
-    require_zip(source != nullptr, why, path);
-    const zip_int64_t index = zip_file_add(archive.get(), name.c_str(), source, ZIP_FL_ENC_UTF_8);
-    if (index < 0) zip_source_free(source);
-    require_zip(index >= 0, why, path);
-    const auto entry = static_cast<zip_uint64_t>(index);
-    // Stored as they are, and of no time: the same arrays give the same bytes.
-    require_zip(zip_set_file_compression(archive.get(), entry, ZIP_CM_STORE, 0) == 0, why, path);
-    require_zip(zip_file_set_dostime(archive.get(), entry, 0, (1 << 5) | 1, 0) == 0, why, path);
-    require_zip(zip_file_set_external_attributes(archive.get(), entry, 0, ZIP_OPSYS_UNIX, 0600u << 16) == 0, why, path);
-  }
-  require_zip(zip_close(archive.get()) == 0, why, path);
-  static_cast<void>(archive.release());  // closed
-
-  zip_stat_t stat;
-  zip_stat_init(&stat);
-  require_zip(zip_source_stat(bytes.get(), &stat) == 0 && zip_source_open(bytes.get()) == 0,
-              zip_source_error(bytes.get()), path);
-  std::string all(stat.size, '\0');
-  const zip_int64_t read = zip_source_read(bytes.get(), all.data(), all.size());
-  zip_source_close(bytes.get());
-  require_zip(read == static_cast<zip_int64_t>(all.size()), zip_source_error(bytes.get()), path);
-  write_text(path, all);
+  write_text(path, zip_archive(entries));
 }
 
 }  // namespace cutproof::io

@@ -49,8 +49,8 @@ void expect_array(const ArrayFile& file, const std::string& name, const std::vec
 }
 
 TEST_F(ArrayFiles, OfNumpyAndH5pyAreRead) {
-  for (const char* name :
-       {"plain.npz", "deflated.npz", "bytes.npz", "big_endian.npz", "plain.h5", "packed.h5", "list.h5", "matlab.mat"}) {
+  for (const char* name : {"plain.npz", "deflated.npz", "streamed.npz", "large_numbers.npz", "bytes.npz",
+                           "big_endian.npz", "plain.h5", "packed.h5", "list.h5", "matlab.mat"}) {
     SCOPED_TRACE(name);
     ASSERT_TRUE(is_array_file(path(name)));
     const ArrayFile file = read_array_file(path(name));
@@ -164,6 +164,18 @@ TEST_F(ArrayFiles, ThatCannotBeReadAreRefused) {
       {"axes.npz", {"x: ", "9 axes"}},
       {"cut_off.npz", {"The archive cannot be read"}},
       {"flipped.npz", {"x: ", "damaged"}},
+      {"header.npz", {"y: ", "header is not that of the directory"}},
+      {"other_name.npz", {"y: ", "header is not that of the directory"}},
+      {"directory.npz", {"The archive cannot be read", "directory is damaged"}},
+      {"encrypted.npz", {"x.npy: ", "encrypted"}},
+      {"outside.npz", {"x: ", "cut off"}},
+      {"longer.npz", {"x: ", "after its end"}},
+      {"claims_4_gib.npz", {"x.npy: ", "claims 4294967295 bytes"}},
+      {"no_size.npz", {"The archive cannot be read", "size is missing"}},
+      {"fewer.npz", {"The archive cannot be read", "directory is damaged"}},
+      {"far_directory.npz", {"The archive cannot be read", "before its end"}},
+      {"inflated_otherwise.npz", {"x: ", "damaged"}},
+      {"no_deflation.npz", {"x: ", "damaged"}},
       {"alone.npz", {"neither an NPZ nor an HDF5"}},
       {"empty.npz", {"empty"}},
       {"text.h5", {"neither an NPZ nor an HDF5"}},

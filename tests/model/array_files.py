@@ -49,6 +49,14 @@ def write_good(folder):
     np.savez(folder / "big_endian.npz", promises=np.array(WORDS, ">U17"),
              **{name: np.asarray(values).astype(np.asarray(values).dtype.newbyteorder(">"))
                 for name, values in NUMBERS.items()})
+    with open(folder / "streamed.npz", "wb") as file:  # sizes and sums stand behind each array
+        stream = type("Stream", (), {"read": None, "write": file.write, "flush": file.flush})
+        np.savez_compressed(stream(), promises=np.array(WORDS.split()), **NUMBERS)
+    limit, zipfile.ZIP64_LIMIT = zipfile.ZIP64_LIMIT, 10  # as if all were larger than 4 GiB
+    np.savez(folder / "large_numbers.npz", promises=WORDS, **NUMBERS)
+    zipfile.ZIP64_LIMIT = limit
+    with zipfile.ZipFile(folder / "deflated.npz", "a") as archive:
+        archive.comment = b"PK\5\6" * 16000
     with h5py.File(folder / "plain.h5", "w") as file:
         for name, values in NUMBERS.items():
             file[name] = values
@@ -105,6 +113,23 @@ def write_bad(folder):
     flipped = bytearray(whole)
     flipped[flipped.index(x.tobytes()) + 3] ^= 1
     (folder / "flipped.npz").write_bytes(flipped)
+    header = whole.index(b"PK\3\4", 1)
+    directory = whole.index(b"PK\1\2")
+    for name, at, value in (("header", header, b"PK\3\5"), ("other_name", header + 30, b"z"),
+                            ("directory", directory, b"PK\3\4"), ("encrypted", directory + 8, b"\1"),
+                            ("longer", directory + 20, b"\xb1"), ("claims_4_gib", directory + 24, b"\xff\xff\xff\xff"),
+                            ("outside", directory + 42, b"\xff\xff\xff\x7f"),
+                            ("fewer", len(whole) - 12, b"\1"), ("far_directory", len(whole) - 6, b"\xff\xff\xff\x7f")):
+        (folder / f"{name}.npz").write_bytes(whole[:at] + value + whole[at + len(value):])
+    (folder / "whole.npz").unlink()
+    large = (folder / "large_numbers.npz").read_bytes()
+    directory = large.index(b"PK\1\2")
+    extra = directory + 46 + large[directory + 28]
+    (folder / "no_size.npz").write_bytes(large[:extra + 2] + b"\0" + large[extra + 3:])
+    np.savez_compressed(folder / "whole.npz", x=np.random.default_rng(1).random(100000))
+    whole = (folder / "whole.npz").read_bytes()
+    for name, at in (("inflated_otherwise", len(whole) // 2), ("no_deflation", whole.index(b"x.npy") + 26)):
+        (folder / f"{name}.npz").write_bytes(whole[:at] + b"\xff\xff\xff" + whole[at + 3:])
     (folder / "whole.npz").unlink()
     np.save(folder / "alone.npy", x)
     (folder / "alone.npy").rename(folder / "alone.npz")
