@@ -1,7 +1,16 @@
-# Configures, builds and runs the project in outside/. WAY: install, or subdirectory.
+# Configures, builds and runs the project in outside/ (WAY: install, or subdirectory), or that in header/ (WAY: header).
 function(run)
   execute_process(COMMAND ${ARGN} COMMAND_ERROR_IS_FATAL ANY)
 endfunction()
+
+if(WAY STREQUAL "header")
+  file(REMOVE_RECURSE ${WORK})
+  run(${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR}/header -B ${WORK} -G Ninja -DCUTPROOF_SOURCE=${SOURCE}
+    -DCUTPROOF_EXECUTABLE=${PROGRAM})
+  run(${CMAKE_COMMAND} --build ${WORK})
+  run(${CMAKE_CTEST_COMMAND} --test-dir ${WORK} --output-on-failure --no-tests=error)
+  return()
+endif()
 
 # The libraries are compiled once more here, without flags: that they build in a project of others is what is tested.
 # Takes over 10 s: an installation does not show it. Files are compiled by themselves in ci/sanitizers.sh odr.
