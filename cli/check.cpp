@@ -71,7 +71,7 @@ int check_recording(const CheckOptions& options) {
   // The file first: it is kept even if standard output cannot be written.
   const nlohmann::json document = to_json(result, &judge);
   write_document(options.json, document);
-  if (!options.report.empty()) write_report(options.report, reader, document, options.again);
+  if (!options.report.empty()) write_report(options.report, reader, document, made_by(options.again));
   const Judging judging{"cutproof check", "cutproof.check." + (scene.name.empty() ? "recording" : scene.name),
                         options.again};
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;

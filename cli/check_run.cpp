@@ -87,8 +87,8 @@ void write_page_of(const std::string& file, const harness::JudgedRun& judged, ha
         }
         return of_run;
       }};
-  io::write_text(reports.page,
-                 report::page(source, report::results_of(document, reports.page), reports.again, kVersion));
+  io::write_text(reports.page, report::page(source, report::results_of(document, reports.page), reports.again,
+                                            made_by(reports.again)));
 }
 
 }  // namespace

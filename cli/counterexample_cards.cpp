@@ -133,7 +133,7 @@ std::optional<bool> add_counterexample(report::Card& card, const Counterexample&
   }
   const Setup& setup = shown.loaded.setup;
   scenery.body = report::body_json(setup, scenery.sides.front().pictures.particles);
-  scenery.blade = report::blade_size_json(setup);
+  scenery.blade = report::blade_json(setup);
   card.picture = static_cast<int>(sceneries.size());
   sceneries.push_back(std::move(scenery));
   return failure.has_value();
@@ -160,7 +160,7 @@ report::Sheet counterexample_sheet(const std::vector<Counterexample>& counterexa
     sheet.cards.push_back(std::move(card));
   }
   if (run > 0) sheet.holds = failing == 0 && run == counterexamples.size();
-  sheet.badge = run == 0 ? "not run" : failing > 0 ? "✕ fails" : *sheet.holds ? "✓ holds now" : "not all run";
+  sheet.badge = run == 0 ? "not run" : failing > 0 ? "fails" : *sheet.holds ? "holds now" : "not all run";
   sheet.summary = run == 0 ? std::string("Saved cases that failed once. None was run again for this page.")
                            : fmt::format("Saved cases that failed once, run again for this page: {} of {} {}.", failing,
                                          counterexamples.size(), failing == 1 ? "fails" : "fail");

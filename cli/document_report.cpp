@@ -96,7 +96,7 @@ std::string campaign_again(const json& document) {
 }
 
 DocumentPage page_of_documents(const std::vector<json>& documents, const std::vector<std::string>& files,
-                               const std::optional<BackendChoice>& chosen) {
+                               const std::optional<BackendChoice>& chosen, const report::Made& made) {
   std::vector<report::Sheet> sheets;
   std::vector<report::Scenery> sceneries;
   for (std::size_t k = 0; k < documents.size(); ++k) {
@@ -116,14 +116,14 @@ DocumentPage page_of_documents(const std::vector<json>& documents, const std::ve
   for (const report::Sheet& sheet : sheets) {
     if (sheet.holds) page.holds = page.holds.value_or(true) && *sheet.holds;
   }
-  page.text = report::document_page(sheets, sceneries, kVersion);
+  page.text = report::document_page(sheets, sceneries, made);
   return page;
 }
 
-void write_document_report(const std::string& path, const json& document,
+void write_document_report(const std::string& path, const json& document, const report::Made& made,
                            const std::optional<BackendChoice>& own_backend) {
   if (path.empty()) return;
-  io::write_text(path, page_of_documents({document}, {""}, own_backend).text);
+  io::write_text(path, page_of_documents({document}, {""}, own_backend, made).text);
 }
 
 }  // namespace cutproof::cli

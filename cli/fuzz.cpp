@@ -191,7 +191,8 @@ int conclude_campaign(const FuzzOptions& options, const json& document, bool who
   const Judging judging{"cutproof fuzz", "cutproof.fuzz." + document.at("backend").get<std::string>(), options.again};
   write_document(options.json, document);
   const bool is_plugin = options.backend.name.starts_with(guests::kPluginPrefix);
-  write_document_report(options.report, document, is_plugin ? std::optional(options.backend) : std::nullopt);
+  write_document_report(options.report, document, made_by(options.again, options.backend.name),
+                        is_plugin ? std::optional(options.backend) : std::nullopt);
   write_junit(options.junit, judging, document.at("seconds").get<double>(),
               cases_of_campaign(document, conclusion.failure, judging));
   const int status = print_conclusion(document, conclusion);

@@ -436,9 +436,9 @@ int judge(JudgeOptions options) {
   if (options.attached.empty()) {
     harness::BackendChoice plugin;
     plugin.name = plugin_backend(options);
-    write_document_report(options.report, document, plugin);
+    write_document_report(options.report, document, made_by(options.again), plugin);
   } else {
-    write_document_report(options.report, document);
+    write_document_report(options.report, document, made_by(options.again));
   }
   double seconds = 0;
   for (const io::JunitCase& each : junit) seconds += each.seconds;

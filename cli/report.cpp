@@ -40,6 +40,7 @@ namespace {
 struct ReportOptions {
   std::vector<std::string> files;
   std::string output, backend;
+  std::string again;  // the command line
 };
 
 constexpr const char* kSets =
@@ -183,7 +184,8 @@ int report_recordings(const ReportOptions& options, const std::vector<std::strin
     beside.emplace(ReadBeside{*other->reader, true, std::move(name), std::move(own_name),
                               "the same particle of the other recording, in the same moment"});
   }
-  write_page(options.output, reader, results, "cutproof check " + quoted(files.front()), beside ? &*beside : nullptr);
+  write_page(options.output, reader, results, "cutproof check " + quoted(files.front()), made_by(options.again),
+             beside ? &*beside : nullptr);
   print_written(options.output);
   insist("{}\n", !results.checked ? "nothing on the page is judged: give results for that"
                  : results.holds  ? "everything on the page holds"
@@ -210,7 +212,7 @@ int make_report(const ReportOptions& options) {
     for (const std::string& name : given.names) cases.push_back(property_tests::read_counterexample(name));
     std::vector<report::Scenery> sceneries;
     const report::Sheet sheet = counterexample_sheet(cases, given.names, chosen, sceneries);
-    io::write_text(options.output, report::document_page({sheet}, sceneries, kVersion));
+    io::write_text(options.output, report::document_page({sheet}, sceneries, made_by(options.again)));
     print_written(options.output);
     say_whether(sheet.holds);
     return 0;
@@ -224,7 +226,7 @@ int make_report(const ReportOptions& options) {
       names.push_back(given.names[number]);
     }
   }
-  const DocumentPage page = page_of_documents(documents, names, chosen);
+  const DocumentPage page = page_of_documents(documents, names, chosen, made_by(options.again));
   if (counterexamples != given.documents.end()) {
     for (const std::size_t number : counterexamples->second)
       require_of_campaign(documents.front(), given.names[number]);
@@ -252,7 +254,10 @@ void add_report(CLI::App& program, Work& work) {
   command->add_option("-o,--output", options->output, "the page to write")->required()->type_name("F");
   add_backend_name(*command, options->backend,
                    "on which counterexamples are run again (default: where they were found, but no plugin)");
-  command->callback([options, &work] { work = [options] { return make_report(*options); }; });
+  command->callback([options, command, &work] {
+    options->again = as_given(*command);
+    work = [options] { return make_report(*options); };
+  });
 }
 
 }  // namespace cutproof::cli

@@ -1,11 +1,16 @@
 #include "cli/report_page.h"
 
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <cstdlib>
+#include <ctime>
 #include <optional>
 
 #include "cli/commands.h"
 #include "cli/output.h"
+#include "harness/backends.h"
 #include "model/io/atomic_file.h"
-#include "report/page.h"
 
 namespace cutproof::cli {
 
@@ -20,6 +25,14 @@ void require_report(const std::string& path) {
   require_writable(path);
 }
 
+report::Made made_by(const std::string& command, const std::string& backend) {
+  const char* const commit = std::getenv("CUTPROOF_COMMIT");
+  const harness::BackendDescriptor& worker =
+      backend.empty() ? harness::reference_backend() : harness::described_backend(backend);
+  return {kVersion, command, fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr))),
+          harness::processor_of(worker), commit != nullptr ? commit : ""};
+}
+
 namespace {
 
 report::Source source_of(const io::RecordingReader& recording) {
@@ -30,18 +43,18 @@ report::Source source_of(const io::RecordingReader& recording) {
 }  // namespace
 
 void write_page(const std::string& path, const io::RecordingReader& recording, const report::Results& results,
-                const std::string& again, const ReadBeside* beside) {
+                const std::string& again, const report::Made& made, const ReadBeside* beside) {
   std::optional<report::Beside> other;
   if (beside != nullptr) {
     other.emplace(report::Beside{source_of(beside->recording), beside->is_shown, beside->name, beside->own_name,
                                  beside->obtained});
   }
-  io::write_text(path, report::page(source_of(recording), results, again, kVersion, other ? &*other : nullptr));
+  io::write_text(path, report::page(source_of(recording), results, again, made, other ? &*other : nullptr));
 }
 
 void write_report(const std::string& path, const io::RecordingReader& recording, const nlohmann::json& document,
-                  const std::string& again, const ReadBeside* beside) {
-  write_page(path, recording, report::results_of(document, path), again, beside);
+                  const report::Made& made, const ReadBeside* beside) {
+  write_page(path, recording, report::results_of(document, path), made.command, made, beside);
 }
 
 }  // namespace cutproof::cli

@@ -221,7 +221,8 @@ void write_run_page(const RunOptions& options, const RunSession& session, const 
                                     : "the same particle of the reference, which began alike and ran by "
                                       "itself, up to the first decision in which the two differ"});
   }
-  write_report(options.report, *session.recording(), document, options.again, beside ? &*beside : nullptr);
+  write_report(options.report, *session.recording(), document, made_by(options.again, options.backend.name),
+               beside ? &*beside : nullptr);
 }
 
 std::vector<io::JunitCase> cases_of_run(const RunSession& session, const Judging& judging) {

@@ -273,7 +273,7 @@ int tune(Asked asked) {
     if (step == TuneStep::trial || step == TuneStep::searched) keep_document(asked.json, document);
     if (step == TuneStep::stopped || document.at("complete")) {
       write_document(asked.json, document);
-      write_document_report(asked.report, document);
+      write_document_report(asked.report, document, made_by(asked.again, document.at("backend")));
     }
     print(asked.tune, step, document, given, built);
     if (step == TuneStep::trial) part = std::max(part, part_searched(document, given));  // what is varied begins anew

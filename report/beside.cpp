@@ -121,7 +121,8 @@ std::vector<Moment> moments_of(const Source& source) {
   for (int64_t i = 0; i < source.count; ++i) {
     const io::Snapshot snapshot = source.snapshot(i);
     const bool is_end = snapshot.stage == Stage::skin;
-    moments.push_back({i, snapshot.state.frame - (i > 0 && is_end ? 1 : 0), snapshot.stage, i == 0});
+    const bool is_start = i == 0 && !source.is_foreign();
+    moments.push_back({i, snapshot.state.frame - (!is_start && is_end ? 1 : 0), snapshot.stage, is_start});
   }
   return moments;
 }

@@ -102,7 +102,7 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
           simplified.is_there()
               ? fmt::format("from {} to {}", size(drawn), size(simplified))
               : fmt::format("none: of {}, it fails only with the other bodies of its load", size(drawn)));
-      card.facts.emplace_back("As it was drawn", one["text"].text());
+      if (simplified.is_there()) card.facts.emplace_back("As it was drawn", one["text"].text());
     }
     if (sheet.cards.size() < kMostCards) {
       sheet.cards.push_back(std::move(card));
@@ -115,7 +115,7 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
   // Nothing holds because its document says so.
   sheet.holds = document["holds"].flag() && wrong == 0 && properties.failing == 0 && properties.judged > 0 &&
                 verdicts > 0 && is_complete && failure.empty();
-  sheet.badge = *sheet.holds ? "✓ holds" : wrong == 0 && !is_complete ? "✕ incomplete" : "✕ fails";
+  sheet.badge = *sheet.holds ? "holds" : wrong == 0 && !is_complete ? "incomplete" : "fails";
   const std::string subject =
       fmt::format("cutproof tried {} random dissections{} on backend {}, {:.3g} particles on average",
                   io::grouped(cases), moves ? " of moving bodies" : "", backend, document["mean_particles"].number());
@@ -227,8 +227,9 @@ Sheet judge_sheet(const Field& document) {
       const Field drawn = failure["drawn_size"];
       const std::string which =
           drawn.is_there() ? "of size " + io::grouped(drawn.count()) : io::grouped(failure["index"].count());
+      const std::string simplified = failure["simplified"].text();  // what is said already is not said again
       card.facts = {{"Question", fmt::format("{} ({})", which, failure["kind"].text())},
-                    {"Simplified to", failure["size"].text() + ": " + failure["simplified"].text()},
+                    {"Simplified to", failure["size"].text() + (simplified == card.words ? "" : ": " + simplified)},
                     {"Measured / bound", fmt::format("{:.4g}{} / {:.4g}{}", failure["measured"].number(), unit,
                                                      failure["bound"].number(), unit)},
                     {"Saved as", failure["file"].text_or("")}};
@@ -252,7 +253,7 @@ Sheet judge_sheet(const Field& document) {
     failing += !one["holds"].flag();
   }
   sheet.holds = document["holds"].flag() && all_hold && judged > 0 && is_complete;
-  sheet.badge = *sheet.holds ? "✓ holds" : failing == 0 && !is_complete ? "✕ incomplete" : "✕ fails";
+  sheet.badge = *sheet.holds ? "holds" : failing == 0 && !is_complete ? "incomplete" : "fails";
   const std::string what = library.empty() ? sheet.title : fmt::format("{} ({})", sheet.title, library);
   sheet.summary =
       *sheet.holds ? fmt::format("cutproof judged the kernels of {}: everything that was judged holds.", what)

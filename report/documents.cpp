@@ -158,7 +158,9 @@ PropertyTable property_table(const Field& properties) {
                    {{one["property"].text(), one["stage"].text(), result, io::grouped(judged), io::grouped(failed),
                      looked || fails ? figure_text(measured) + unit : "–",
                      looked && of_bound ? fmt::format("{:.2g}", *of_bound) : "–", looked ? doubt : "–"},
-                    fails ? "bad" : ""}});
+                    fails                 ? "bad"
+                    : looked && !of_bound ? "exact"
+                                          : ""}});
   });
   std::stable_sort(all.begin(), all.end(), [](const Read& a, const Read& b) {
     return a.rank != b.rank ? a.rank < b.rank : a.of_bound > b.of_bound;
@@ -185,7 +187,7 @@ void add_measurement(Sheet& sheet, const Field& document) {
   const Field holds = document["holds"];
   if (holds.is_there()) sheet.holds = holds.flag();
   if (!is_complete) sheet.holds = false;
-  sheet.badge = !is_complete ? "✕ incomplete" : !sheet.holds ? "measured" : *sheet.holds ? "✓ holds" : "✕ fails";
+  sheet.badge = !is_complete ? "incomplete" : !sheet.holds ? "measured" : *sheet.holds ? "holds" : "fails";
   for (const char* const fact : {"backend", "device", "date"}) {
     const std::string text = document[fact].text();
     sheet.facts.push_back(std::string(fact) == "backend" ? "backend " + text : text);

@@ -34,6 +34,14 @@ std::string filled(std::string_view page, const std::vector<std::pair<std::strin
 
 }  // namespace
 
+nlohmann::json to_json(const Made& made) {
+  return {{"program", made.program},
+          {"command", made.command},
+          {"date", made.date},
+          {"machine", made.machine},
+          {"commit", made.commit}};
+}
+
 std::string html(const std::string& data, const std::vector<std::string>& chunks,
                  const std::vector<std::string>& beside) {
   std::string later;

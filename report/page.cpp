@@ -10,7 +10,7 @@
 #include "model/io/json_text.h"
 #include "report/assets.h"
 #include "report/coding.h"
-#include "report/html.h"
+#include "report/document_page.h"
 
 namespace cutproof::report {
 
@@ -87,55 +87,46 @@ std::string thinned_in_words(const Pictures& pictures, int32_t particles, bool i
 }
 
 json data_json(const Source& source, const Results& results, const Pictures& pictures, const std::string& again,
-               const std::string& program) {
-  const Setup& setup = source.setup;
-  const Body& body = setup.body;
+               const Made& made) {
   json rows = json::array(), findings = json::array();
   for (const PropertyRow& row : results.rows) rows.push_back(row_json(row));
   for (std::size_t k = 0; k < results.findings.size(); ++k)
     findings.push_back(finding_json(results.findings[k], pictures.marks[k]));
-  return {
-      {"summary", summary_sentence(results)},
-      {"command", results.command},
-      {"scene", results.scene},
-      {"backend", results.backend},
-      {"judgedBy", results.version},
-      {"program", program},
-      {"checked", results.checked},
-      {"holds", results.holds},
-      {"verdicts", results.verdicts},
-      {"again", again},
-      {"rows", std::move(rows)},
-      {"findings", std::move(findings)},
-      {"findingsLeftOut", results.findings_left_out},
-      {"notes", results.notes},
-      {"notReached", results.not_reached},
-      {"seconds", series_json(results.seconds)},
-      {"errors", series_json(results.errors)},
-      {"frames", frames_json(pictures.frames)},
-      {"body",
-       {{"name", body.name},
-        {"particles", body.particle_count()},
-        {"kept", pictures.particles},
-        {"spacing", body.grid.spacing},
-        {"onGrid", body.on_grid()},
-        {"orientation", body.orientation.m}}},
-      {"blade", setup.has_blade ? json{setup.blade.length, setup.blade.depth, setup.blade.thickness} : json(nullptr)},
-      {"moments", pictures.own.details},
-      {"firstMoment", pictures.own.first_moment},
-      {"comparison", pictures.comparison},
-      {"besideMoments", pictures.beside.details},
-      {"besideFirst", pictures.beside.first_moment},
-      {"reach",
-       {{pictures.reach_low.x, pictures.reach_low.y, pictures.reach_low.z},
-        {pictures.reach_high.x, pictures.reach_high.y, pictures.reach_high.z}}},
-      {"loss", std::max(pictures.own.loss, pictures.beside.loss)},
-      {"nowhere", std::max(pictures.own.nowhere, pictures.beside.nowhere)},
-      {"thinned", thinned_in_words(pictures, body.particle_count(), source.is_foreign())},
-      // A run of somebody else's has frames without stages; with or without pieces, which need tissue.
-      {"foreign", source.is_foreign()},
-      {"hasPieces", !source.is_foreign() || !results.pieces.empty()},
-      {"lastCut", results.last_cut}};
+  return {{"summary", summary_sentence(results)},
+          {"command", results.command},
+          {"scene", results.scene},
+          {"backend", results.backend},
+          {"judgedBy", results.version},
+          {"made", to_json(made)},
+          {"checked", results.checked},
+          {"holds", results.holds},
+          {"verdicts", results.verdicts},
+          {"again", again},
+          {"rows", std::move(rows)},
+          {"findings", std::move(findings)},
+          {"findingsLeftOut", results.findings_left_out},
+          {"notes", results.notes},
+          {"notReached", results.not_reached},
+          {"seconds", series_json(results.seconds)},
+          {"errors", series_json(results.errors)},
+          {"frames", frames_json(pictures.frames)},
+          {"body", body_json(source.setup, pictures.particles)},
+          {"blade", blade_json(source.setup)},
+          {"moments", pictures.own.details},
+          {"firstMoment", pictures.own.first_moment},
+          {"comparison", pictures.comparison},
+          {"besideMoments", pictures.beside.details},
+          {"besideFirst", pictures.beside.first_moment},
+          {"reach",
+           {{pictures.reach_low.x, pictures.reach_low.y, pictures.reach_low.z},
+            {pictures.reach_high.x, pictures.reach_high.y, pictures.reach_high.z}}},
+          {"loss", std::max(pictures.own.loss, pictures.beside.loss)},
+          {"nowhere", std::max(pictures.own.nowhere, pictures.beside.nowhere)},
+          {"thinned", thinned_in_words(pictures, source.setup.body.particle_count(), source.is_foreign())},
+          // A run of somebody else's has frames without stages; with or without pieces, which need tissue.
+          {"foreign", source.is_foreign()},
+          {"hasPieces", !source.is_foreign() || !results.pieces.empty()},
+          {"opens", results.opens}};
 }
 
 }  // namespace
@@ -191,10 +182,10 @@ Results unjudged(const io::Recording& recording, const std::string& scene) {
   return results;
 }
 
-std::string page(const Source& source, const Results& results, const std::string& again, const std::string& program,
+std::string page(const Source& source, const Results& results, const std::string& again, const Made& made,
                  const Beside* beside, int64_t most_picture_bytes) {
   const Pictures pictures = pictures_of(source, results.findings, most_picture_bytes, beside);
-  const std::string data = script_json(io::json_text(data_json(source, results, pictures, again, program)));
+  const std::string data = script_json(io::json_text(data_json(source, results, pictures, again, made)));
   return html(data, pictures.own.text, pictures.beside.text);
 }
 

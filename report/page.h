@@ -4,6 +4,7 @@
 #include <string>
 
 #include "report/beside.h"
+#include "report/html.h"
 #include "report/pictures.h"
 #include "report/results.h"
 
@@ -15,10 +16,9 @@ void require_pages(const std::string& option);
 // About as much of a page is particles and skin at most.
 inline constexpr int64_t kMostPictureBytes = int64_t{28} << 20;
 
-// The page as text. `again`: the command line that shows it again, `program` the version of this program. Results of
-// another body than the recording's are refused (InputError naming `results_file`).
-// `beside`: another run of the same body, shown or measured beside the one that the page is about; or null.
-std::string page(const Source& source, const Results& results, const std::string& again, const std::string& program,
+// The page as text. `again`: the command line that judges it again. `beside`: another run of the same body, shown or
+// measured beside the one that the page is about; or null.
+std::string page(const Source& source, const Results& results, const std::string& again, const Made& made,
                  const Beside* beside = nullptr, int64_t most_picture_bytes = kMostPictureBytes);
 // Throws InputError naming `other_file` if the two do not hold the same body: as many particles, in the same places at
 // rest, with the same edges.

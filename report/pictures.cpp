@@ -207,7 +207,7 @@ class Chunk {
 
 json point_json(Vec3 p) { return {p.x, p.y, p.z}; }
 
-json blade_json(const Setup& setup, const Moment& moment) {
+json pose_json(const Setup& setup, const Moment& moment) {
   const BladePose* const pose = moment.is_start ? nullptr : last_lowered(setup, moment.frame);
   if (pose == nullptr) return nullptr;
   return {point_json(pose->edge), point_json(pose->along), point_json(pose->back)};
@@ -246,7 +246,7 @@ json detail(const Setup& setup, const Moment& moment, const State& state, int32_
           {"clusters", state.clusters.number.size()},
           {"components", pieces},
           {"removed", state.removed.size() + state.debris.size()},
-          {"blade", blade_json(setup, moment)}};
+          {"blade", pose_json(setup, moment)}};
 }
 
 // The moment that shows a finding: after its stage in its frame, or the next one that there is.

@@ -1,6 +1,7 @@
 #include "report/results.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -66,7 +67,9 @@ void add_verdict(const Field& verdict, const Measured* known, std::vector<Row>& 
                     bound_text = was_judged ? figure(bound) : "none";
   const std::string unit = given_unit == "1" || !was_judged ? "" : given_unit, source = verdict["bound_source"].text();
   const bool has_ratio = was_judged && (known == nullptr || known->count({property, stage}) != 0) &&
-                         std::isfinite(measured) && std::isfinite(bound) && bound > 0;
+                         std::isfinite(measured) && std::isfinite(bound) && bound > 0 &&
+                         // What demands at least its bound has no room to lose.
+                         (!holds || measured < bound) && property != "something was judged";
   const std::optional<double> of_bound = has_ratio ? std::optional(measured / bound) : std::nullopt;
   ++results.verdicts;
   if (shown.bound_source.empty()) shown.bound_source = source;
@@ -196,23 +199,56 @@ void add_series(const Field& document, Results& results) {
   }
 }
 
+std::string pieces_in_words(int64_t pieces) {
+  return fmt::format("Its tissue is {} {}", pieces, pieces == 1 ? "piece" : "pieces");
+}
+
+int64_t frame_or_none(const Field& frame) { return frame.is_nothing() ? -1 : frame.count(); }
+
+// What only one of the commands says.
+void add_subject(const Field& document, Results& results) {
+  if (results.command == "check_run") {
+    results.scene = document["source"].text();
+    results.particles = document["run"]["particles_at_end"].count();
+    if (document["pieces"]["units"].count() > 0)
+      results.pieces = "At its end: " + document["pieces"]["in_words"].text();
+    results.opens = frame_or_none(document["pieces"]["last_cut"]);
+  } else if (results.command == "check_state") {
+    results.scene = document["source"].text();
+    results.particles = document["body"]["particles"].count();
+    if (const Field pieces = document["body"]["pieces"]; !pieces.is_nothing())
+      results.pieces = pieces_in_words(pieces.count());
+  } else if (results.command == "kick") {
+    results.scene = document["source"].text();
+    results.particles = document["particles"].count();
+    if (const Field kicks = document["kicks"]; kicks.length() > 0) {
+      results.opens = frame_or_none(kicks.at(0)["kick_frame"]);
+      results.pieces = pieces_in_words(static_cast<int64_t>(kicks.at(0)["pieces"].length()));
+    }
+  } else {
+    const std::vector<std::string> sources = document["sources"].texts();
+    results.scene = fmt::format("{} ({})", fmt::join(sources, " and "), document["map"].text());
+    results.particles = document["particles"].count();
+    if (const Field sharpest = document["sharpest"]; !sharpest.is_nothing()) results.opens = sharpest["frame"].count();
+  }
+}
+
 // What was not judged stands among the rows of what was.
-Results foreign_results(const Field& document) {
+Results foreign_results(const Field& document, const std::string& command) {
   Results results;
-  results.command = "check_run";
+  results.command = command;
   results.version = document["cutproof"].text();
-  results.scene = document["source"].text();
-  results.particles = document["run"]["particles_at_end"].count();
+  add_subject(document, results);
   results.checked = true;
   results.holds = document["summary"]["holds"].flag();
   add_verdicts(document, results);
-  document["not_judged"].each([&](const Field& one) {
-    PropertyRow& row = results.rows.emplace_back();
-    row.property = one["property"].text();
-    row.vacuous = one["why"].text();
-  });
-  if (document["pieces"]["units"].count() > 0) results.pieces = document["pieces"]["in_words"].text();
-  results.last_cut = document["pieces"]["last_cut"].is_nothing() ? -1 : document["pieces"]["last_cut"].count();
+  if (const Field not_judged = document["not_judged"]; not_judged.is_there()) {
+    not_judged.each([&](const Field& one) {
+      PropertyRow& row = results.rows.emplace_back();
+      row.property = one["property"].text();
+      row.vacuous = one["why"].text();
+    });
+  }
   results.notes = document["notes"].texts();
   return results;
 }
@@ -223,7 +259,9 @@ Results results_of(const json& given, const std::string& file) {
   const Field document = {&given, file, "", kRemedy};
   if (!given.is_object()) document.refuse("this is no result of cutproof");
   const std::string format = document["format"].text();
-  if (format == "cutproof.check_run") return foreign_results(document);
+  for (const char* const command : {"check_run", "check_state", "kick", "relate"}) {
+    if (format == std::string("cutproof.") + command) return foreign_results(document, command);
+  }
   Results results;
   if (format != "cutproof.run" && format != "cutproof.check")
     document["format"].refuse("'" + format + "' is no result of a run or of a check, of which alone a page is made");
@@ -292,10 +330,18 @@ std::string count_in_words(const std::vector<PropertyRow>& rows) {
   return words;
 }
 
+// Of somebody else's.
+std::string subject_of(const Results& results) {
+  if (results.command == "check_state") return "cutproof judged the state " + results.scene;
+  if (results.command == "kick") return "cutproof judged the kicks of " + results.scene;
+  if (results.command == "relate") return "cutproof judged whether these correspond: " + results.scene;
+  return "cutproof judged the run " + results.scene;
+}
+
 std::string of_what_was_judged(const Results& results) {
   const std::string scene = results.scene.empty() ? "a scene without a name" : "scene " + results.scene;
   const std::string subject =
-      results.is_foreign()       ? "cutproof judged the run " + results.scene
+      results.is_foreign()       ? subject_of(results)
       : results.command == "run" ? fmt::format("cutproof ran {} on backend {}", scene, results.backend)
       : results.command == "check"
           ? fmt::format("cutproof judged a recording of {}, simulated by backend {}", scene, results.backend)
@@ -312,6 +358,7 @@ std::string of_what_was_judged(const Results& results) {
            fmt::format(", in {} {}.", io::grouped(results.verdicts), results.verdicts == 1 ? "verdict" : "verdicts");
   if (first == results.findings.end()) return sentence + ".";
   const std::string stage = results.is_foreign() ? "" : fmt::format(" after {}", name_of(first->stage));
+  if (results.command == "check_state") return sentence + fmt::format("; '{}' fails.", first->property);
   return sentence + fmt::format("; '{}' fails{} in frame {}{}.", first->property, failing > 1 ? " first," : "",
                                 first->frame, stage);
 }
@@ -320,7 +367,7 @@ std::string of_what_was_judged(const Results& results) {
 
 std::string summary_sentence(const Results& results) {
   std::string sentence = of_what_was_judged(results);
-  if (!results.pieces.empty()) sentence += " At its end: " + results.pieces + ".";
+  if (!results.pieces.empty()) sentence += " " + results.pieces + ".";
   return results.left_stages.empty() ? sentence : sentence + " " + left_in_words(results.left_stages);
 }
 

@@ -44,7 +44,9 @@ struct Series {
 };
 
 struct Results {
-  std::string command;  // "run", "check"; "recording": there are no results; "check_run": of somebody else's run
+  // "run", "check"; "recording": there are no results; of somebody else's simulator "check_run", "check_state", "kick",
+  // "relate".
+  std::string command;
   std::string version;  // of the program that judged
   std::string scene, backend;
   std::optional<int64_t> particles;
@@ -55,10 +57,11 @@ struct Results {
                                   // bound, then those that had nothing to look at
   std::vector<Finding> findings;  // by frame and stage, those that were expected at the end; at most kMostFindings
   int64_t findings_left_out = 0;
-  // Of somebody else's run: its pieces in words, and the last frame in which the blade has parted tissue, or -1.
+  // Of somebody else's: pieces in words; and the frame in which most is seen if all holds, or -1: the last that parted
+  // tissue, the kick, the sharpest comparison.
   std::string pieces;
-  int64_t last_cut = -1;
-  bool is_foreign() const { return command == "check_run"; }
+  int64_t opens = -1;
+  bool is_foreign() const { return command != "run" && command != "check" && command != "recording"; }
   std::vector<std::string> notes, not_reached;
   std::vector<std::string> left_stages;  // that the reference ran for the backend: not judged
   std::vector<Series> seconds;           // of each stage that was timed [s]
@@ -69,7 +72,7 @@ inline constexpr int64_t kMostFindingsOfOne = 30;      // of one property after 
 inline constexpr std::size_t kMostWitnesses = 20'000;  // particles, or clusters, of one finding
 
 // `file` names the document in errors. Throws InputError for what is no document of `run` or `check`, naming the field.
-// Of `check` of somebody else's run, too, whose scene is the run's file.
+// Of somebody else's the scene is the file.
 Results results_of(const nlohmann::json& document, const std::string& file);
 Results read_results(const std::string& file);
 

@@ -48,7 +48,7 @@ struct Column {
 };
 struct GridRow {
   std::vector<std::string> cells;
-  std::string kind = {};  // good, bad, warn, paper; empty: as any other
+  std::string kind = {};  // good, bad, warn, paper; exact: it holds, and has no margin; empty: as any other
 };
 struct Grid {
   std::string title, words;

@@ -90,8 +90,8 @@ Sheet tune_sheet(const Field& document) {
   chart.curves.push_back(front_of(timed, "the best"));
   add_tolerance(chart, timed, tolerance);
   if (has_found) {
-    sheet.holds = sheet.badge != "✕ incomplete";
-    if (*sheet.holds) sheet.badge = "✓ found";
+    sheet.holds = sheet.badge != "incomplete";
+    if (*sheet.holds) sheet.badge = "found";
     const Field verified = found["verified"];
     const double cheaper = found["times_cheaper"].number();
     sheet.summary = fmt::format(
@@ -105,7 +105,7 @@ Sheet tune_sheet(const Field& document) {
         io::grouped(found["verdicts"].count()));
   } else {
     sheet.holds = false;
-    if (sheet.badge != "✕ incomplete") sheet.badge = "✕ nothing found";
+    if (sheet.badge != "incomplete") sheet.badge = "nothing found";
     sheet.summary = fmt::format(
         "Of {} configurations of {} that were tried none is known to be within {:.4g} h of the "
         "reference solution.",

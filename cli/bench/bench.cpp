@@ -53,7 +53,7 @@ int print_how_far(const std::string& path, const std::string& report, const nloh
   if (rows > 0) suite.end(document);
   insist("\n{}: it was stopped after {} row{}\n", undecided("INCOMPLETE"), rows, rows == 1 ? "" : "s");
   write_document(path, document);
-  write_document_report(report, document);
+  write_document_report(report, document, made_by(document.value("again", std::string())));
   print_written(path);
   print_written(report);
   return 1;
@@ -105,7 +105,7 @@ void add_suite(CLI::App& command, Work& work, const std::string& what, Suite sui
       }
       progress.reset();
       write_document(*path, document);
-      write_document_report(*report, document);
+      write_document_report(*report, document, made_by(again));
       suite.end(document);
       print_written(*path);
       print_written(*report);

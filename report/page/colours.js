@@ -1,10 +1,10 @@
-// What particles are coloured by. Colours of Okabe and Ito and of cividis, which people of all kinds of colour vision
-// tell apart (tests/report/colours_test.py). A colour is a number as the GPU takes it: red in its lowest byte.
+// What particles are coloured by. Colours of Okabe and Ito, and a ramp from blue to yellow, which people of all kinds of
+// colour vision tell apart, on light and on dark (tests/report/colours_test.py). A colour is a number as the GPU takes it: red in its lowest byte.
 import { coloursOfClusters } from './cluster_colours.js';
 import { figure, plural } from './dom.js';
 
 const kOkabeIto = ['#56B4E9', '#E69F00', '#009E73', '#F0E442', '#CC79A7', '#0072B2', '#D55E00'];
-const kCividis = ['#00224e', '#2a3f6d', '#575d6d', '#7d7c78', '#a59c74', '#d2c060', '#fee838'];
+const kRamp = ['#2a63c4', '#5f79bd', '#8a8aa8', '#ac9a90', '#cbab74', '#e6c052', '#f8da2e'];
 // Clusters, without the colour of what a verdict names; those behind them where a cluster touches so many others.
 const kClusters = ['#56B4E9', '#E69F00', '#009E73', '#F0E442', '#CC79A7', '#0072B2'];
 const kMoreClusters = ['#2a5a75', '#7d5600', '#005a41', '#857e1e', '#6b3a55', '#063a58', '#b9dff6', '#f5d58f', '#8fd3bf', '#f8f3b0', '#e8c3d6', '#8cbfdf'];
@@ -13,20 +13,21 @@ const kChanges = ['#bdb6ae', '#56b4e9', '#f0e442', '#e69f00', '#009e73', '#0b3c8
 const kChangeWords = ['nothing', 'moved', 'skin made here', 'in a cluster that lost members, or is new', 'a cluster grew over it', 'in a cluster that was merged', 'removed'];
 
 const channels = (hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16));
+const hexOf = (colour) => `#${[0, 8, 16].map((shift) => ((colour >> shift) & 255).toString(16).padStart(2, '0')).join('')}`;
 const packed = ([r, g, b]) => ((r & 255) | ((g & 255) << 8) | ((b & 255) << 16)) >>> 0;
 export const kTissue = packed([209, 158, 140]);
 export const kGrey = packed([128, 128, 128]);
 export const kDead = packed([115, 115, 115]);
 const palette = kOkabeIto.map((hex) => packed(channels(hex)));
 const changeColours = kChanges.map((hex) => packed(channels(hex)));
-export const rampStops = kCividis;
+export const rampStops = kRamp;
 export const kIncomparable = 255;
 const kRemoved = 6;
 
 const ramp = new Uint32Array(256);
 for (let k = 0; k < 256; ++k) {
-  const at = (k / 255) * (kCividis.length - 1), low = Math.min(Math.floor(at), kCividis.length - 2);
-  const a = channels(kCividis[low]), b = channels(kCividis[low + 1]);
+  const at = (k / 255) * (kRamp.length - 1), low = Math.min(Math.floor(at), kRamp.length - 2);
+  const a = channels(kRamp[low]), b = channels(kRamp[low + 1]);
   ramp[k] = packed(a.map((x, c) => Math.round(x + (at - low) * (b[c] - x))));
 }
 const onRamp = (share) => ramp[Math.round(255 * Math.min(Math.max(share, 0), 1))];
@@ -62,12 +63,15 @@ function stretches(xyz, alive, edges) {
   return found;
 }
 
+// So many numbers have a key each; of more there is a scale.
+const kMostKeys = 9;
+
 // A distance of its byte (report/beside.h): four to a decade from 1e-12 h on.
 const decade = (code) => code / 4 - 12;
 
 // Each: what it is called, and of a picture the colour of each particle and a legend: words, a scale or keys.
 // `comparison`: with another run, or null. foreign: of somebody else's run, whose clusters are coupling groups.
-export function colourings(hasStretch, comparison, { foreign, hasPieces } = { hasPieces: true }) {
+export function colourings(hasStretch, comparison, { foreign, hasPieces, hasGroups } = { hasPieces: true, hasGroups: true }) {
   let farthest = 1e-9;  // so far, so that colours mean the same from frame to frame
   let least = 250, most = 1;
   const all = {
@@ -123,7 +127,7 @@ export function colourings(hasStretch, comparison, { foreign, hasPieces } = { ha
       },
     },
     apart: {
-      name: comparison && comparison.shown ? 'distance between the two' : 'distance to the reference',
+      name: comparison && comparison.shown ? 'distance between the two' : comparison && `distance to ${comparison.name}`,
       of({ moment, apart }) {
         const codes = moment.apart;
         if (!apart) return { colour: () => kGrey, words: 'This moment has no counterpart, so there is no distance.' };
@@ -152,15 +156,19 @@ export function colourings(hasStretch, comparison, { foreign, hasPieces } = { ha
     holders: {
       name: foreign ? 'number of coupling groups' : 'number of clusters',
       of({ moment }) {
-        let greatest = 1;
-        for (const holders of moment.holders) if (holders > greatest) greatest = holders;
-        return { colour: (i) => onRamp(moment.holders[i] / greatest), words: `How many ${foreign ? 'coupling groups' : 'clusters'} hold each particle.`, scale: ['0', String(greatest)] };
+        const counts = [];
+        moment.holders.forEach((holders, i) => { if (moment.alive[i]) counts[holders] = (counts[holders] || 0) + 1; });
+        const greatest = Math.max(counts.length - 1, 1), words = `How many ${foreign ? 'coupling groups' : 'clusters'} hold each particle.`;
+        const colour = (i) => onRamp(moment.holders[i] / greatest);
+        if (counts.length > kMostKeys) return { colour, words, scale: ['0', String(greatest)] };
+        return { colour, words, keys: counts.map((n, holders) => [hexOf(onRamp(holders / greatest)), `${holders} (${plural(n, 'particle')})`]).filter(Boolean) };
       },
     },
   };
   if (!hasStretch) delete all.stretch;
   if (!hasPieces) delete all.piece;
   if (foreign) delete all.change;
+  if (!hasGroups) { delete all.cluster; delete all.holders; }
   if (!comparison) delete all.apart;
   return all;
 }

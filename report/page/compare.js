@@ -2,10 +2,10 @@
 import { element, figure, plural } from './dom.js';
 
 const far = (max) => (typeof max === 'number' ? `${figure(max)} h` : 'infinitely far: one of them is no number');
-const when = (one) => (one.frame < 0 ? 'as loaded' : `in frame ${one.frame} after ${one.stage}`);
 
-// jump(frame, stage): goes to that moment, and shows the distance there.
-export function comparisonCard(comparison, jump) {
+// jump(frame, stage): goes to that moment, and shows the distance there. Frames of somebody else's have no stages.
+export function comparisonCard(comparison, isForeign, jump) {
+  const when = (one) => (one.frame < 0 ? 'as loaded' : `in frame ${one.frame}${isForeign ? '' : ` after ${one.stage}`}`);
   const { any, decision, greatest, compared, name, ownName } = comparison;
   const go = (one, text, id) => element('button', { type: 'button', class: 'finding', id, text, onclick: () => jump(one.frame, one.stage) });
   const said = [];
@@ -14,7 +14,7 @@ export function comparisonCard(comparison, jump) {
   else {
     said.push(element('p', { id: 'first-apart', text: `They differ first ${when(any)}: ${any.differs}${any.max ? `, by up to ${far(any.max)}` : ''}.` }));
     const buttons = [go(any, 'Show me: the first difference', 'to-first-apart')];
-    if (!decision) said.push(element('p', { text: 'In all of them the same particles are there, in the same clusters, under the same triangles.' }));
+    if (!decision) said.push(element('p', { text: isForeign ? 'In all of them the same particles are there.' : 'In all of them the same particles are there, in the same clusters, under the same triangles.' }));
     else if (decision.frame !== any.frame || decision.stage !== any.stage) {
       said.push(element('p', { text: `They decide differently first ${when(decision)}: ${decision.differs}.` }));
       buttons.push(go(decision, 'Show me: the first decision', 'to-first-decision'));

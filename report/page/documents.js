@@ -1,21 +1,21 @@
 // The page of documents that are no run: campaigns, measurements, counterexamples.
 import { chart, stack } from './charts.js';
 import { grid } from './documents_table.js';
-import { byId, count, element, plural } from './dom.js';
+import { badge, byId, count, element, plural, sayMade } from './dom.js';
 import { Sceneries } from './scenery.js';
-import { sourceInWords } from './sources.js';
+import { sourceNodes } from './sources.js';
 import { command } from './verdicts.js';
 
 const make = { chart, stack, grid };
 const statusKind = (holds) => (holds === null ? 'muted' : holds ? 'good' : 'bad');
-const badge = (sheet) => element('span', { class: `badge ${statusKind(sheet.holds)}`, text: sheet.badge });
+const badgeOf = (sheet) => badge(statusKind(sheet.holds), sheet.badge);
 
 function card(given, sceneries, number) {
   const id = `card-${number}`;
   return element('article', { class: 'card bad failure', 'aria-labelledby': id },
     element('h3', { id, text: given.title }),
     given.words && element('p', { class: 'witness', text: given.words }),
-    element('dl', {}, ...given.facts.flatMap(([what, value]) => [element('dt', { text: what }), element('dd', { text: sourceInWords(value) })])),
+    element('dl', {}, ...given.facts.flatMap(([what, value]) => [element('dt', { text: what }), element('dd', {}, ...sourceNodes(value))])),
     sceneries && given.picture >= 0 && element('div', { class: 'row' }, element('button', { type: 'button', class: 'finding', 'data-scenery': given.picture, 'aria-pressed': 'false', text: 'Show me', onclick: (event) => {
       for (const other of document.querySelectorAll('[data-scenery]')) other.setAttribute('aria-pressed', String(other === event.currentTarget));
       sceneries.show(given.picture);
@@ -33,7 +33,7 @@ function failures(sheet, sceneries, first) {
 
 // A sheet whose page shows others too has a heading of its own.
 function put(main, sheet, isAlone, sceneries, first) {
-  if (!isAlone) main.append(element('header', { class: 'sheet' }, element('h2', { class: 'sheet-title', text: `${sheet.kind}: ${sheet.title}` }), element('p', {}, badge(sheet), element('span', { text: sheet.summary })), element('p', { class: 'muted', text: sheet.facts.join(' · ') })));
+  if (!isAlone) main.append(element('header', { class: 'sheet' }, element('h2', { class: 'sheet-title', text: `${sheet.kind}: ${sheet.title}` }), element('p', {}, badgeOf(sheet), element('span', { text: sheet.summary })), element('p', { class: 'muted', text: sheet.facts.join(' · ') })));
   const judges = sheet.kind === 'campaign' || sheet.kind === 'judged plugin';
   const isPictured = sceneries && sheet.cards.some((one) => one.picture >= 0);
   if (sheet.cards.length) {
@@ -68,8 +68,9 @@ export async function showDocuments(data) {
   const worst = sheets.some((one) => one.holds === false) ? false : sheets.some((one) => one.holds) ? true : null;
   document.title = `${worst === null ? '' : worst ? 'Holds: ' : 'Fails: '}${first.title} · cutproof report`;
   byId('title').textContent = isAlone || sheets.slice(1).every((one) => one.kind === 'campaign') ? `${first.kind[0].toUpperCase()}${first.kind.slice(1)}: ${first.title}` : plural(sheets.length, first.kind);
-  byId('summary').append(...(isAlone ? [badge(first), element('span', { text: first.summary })] : [element('span', { text: worst === null ? '' : worst ? 'Everything on this page holds.' : 'Not everything on this page holds.' })]));
+  byId('summary').append(...(isAlone ? [badgeOf(first), element('span', { text: first.summary })] : [element('span', { text: worst === null ? '' : worst ? 'Everything on this page holds.' : 'Not everything on this page holds.' })]));
   byId('facts').textContent = isAlone ? first.facts.join(' · ') : '';
+  sayMade(data.made);
   const skip = document.querySelector('.skip');
   skip.remove();
   const main = document.querySelector('main');
@@ -82,7 +83,7 @@ export async function showDocuments(data) {
   }
   const about = ['It needs no network. Whatever a plot shows stands in a table, too; figures are rounded to three or four digits, the document has all of them.'];
   if (sceneries) about.unshift(`The 3D view shows ${count(data.sceneries.length)} ${data.sceneries.length === 1 ? 'counterexample' : 'counterexamples'}, each run again when this page was made. Lengths are in h, the spacing of particles. In a view arrows turn, with Shift they shift; + and − zoom, 0 shows the whole body.`);
-  main.append(element('section', { id: 'about', class: 'card' }, element('h2', { text: 'About this page' }), ...about.map((text) => element('p', { text })), element('p', { class: 'muted', text: `Made by cutproof ${data.program}.` })));
+  main.append(element('section', { id: 'about', class: 'card' }, element('h2', { text: 'About this page' }), ...about.map((text) => element('p', { text }))));
   if (sceneries && sceneries.isPlaced) {
     const button = document.querySelector('[data-scenery="0"]');
     if (button) button.setAttribute('aria-pressed', 'true');

@@ -18,6 +18,11 @@ export const byId = (id) => document.getElementById(id);
 
 export const count = (n) => n.toLocaleString('en-US');
 export const plural = (n, one, many) => `${count(n)} ${n === 1 ? one : many || one + 's'}`;
+// When, where and by which command a page was made.
+export function sayMade({ program, date, machine, commit, command }) {
+  const facts = [date, machine, commit && `commit ${commit}`, `cutproof ${program}`].filter(Boolean);
+  byId('made').append(element('span', { text: `Made ${facts.join(' · ')}` }), command && ' · ', command && element('code', { text: command }));
+}
 // Three digits that matter, without a tail of zeros.
 export function figure(x) {
   if (x === 0) return '0';
@@ -25,3 +30,8 @@ export function figure(x) {
   if (size >= 1e5 || size < 1e-3) return x.toExponential(1).replace('e+', 'e').replace('.0e', 'e');
   return String(Number(x.toPrecision(3)));
 }
+
+// Drawn, because a machine with few fonts lacks their letters.
+const kIcons = { play: 'M3 1.5v13l11-6.5z', pause: 'M3 2h4v12h-4zM9 2h4v12h-4z', good: 'M1.5 8.5l2-2 3 3 6-7 2 2-8 9.5z', bad: 'M3.5 1.5l4.5 4.5 4.5-4.5 2 2-4.5 4.5 4.5 4.5-2 2-4.5-4.5-4.5 4.5-2-2 4.5-4.5-4.5-4.5z' };
+export const icon = (name) => kIcons[name] && drawing('svg', { class: 'icon', viewBox: '0 0 16 16', 'aria-hidden': 'true' }, drawing('path', { d: kIcons[name] }));
+export const badge = (kind, text) => element('span', { class: `badge ${kind}` }, icon(kind), element('span', { text }));

@@ -3,9 +3,10 @@ import { Moments } from './coding.js';
 import { colourings, rampStops } from './colours.js';
 import { apartInWords, comparisonCard } from './compare.js';
 import { showDocuments } from './documents.js';
-import { byId, count, drawing, element, figure, plural } from './dom.js';
+import { badge, byId, count, drawing, element, figure, icon, plural, sayMade } from './dom.js';
 import { markedWords, marksOf } from './marks.js';
 import { plotsOf } from './plots.js';
+import { openLinked } from './sources.js';
 import { cards, command, table } from './verdicts.js';
 import { View, contextOf } from './view.js';
 
@@ -16,35 +17,37 @@ const comparison = data.comparison;
 const besides = comparison && comparison.shown ? new Moments(data.besideFirst, 'beside') : null;
 const last = (data.moments || []).length - 1;
 const kFramesPerSecond = 15;
+const hasGroups = Boolean(data.frames) && data.frames.clusters.some((n) => n > 0);
 
 // spot: a particle that is marked where no verdict names any, by its place on the page.
 const state = { at: 0, finding: null, isPlaying: false, spot: null };
 let view = null, edges = null, plots = [], shown = 0, colours = null;
 
-// Frames of somebody else's run have no stages.
-const words = (moment) => (moment.start ? 'As loaded' : data.foreign ? `Frame ${moment.frame}` : `Frame ${moment.frame}, after ${moment.stage}`);
+// Frames of somebody else's run have no stages, and a state has no frames.
+const words = (moment) => (data.command === 'check_state' ? 'The state' : moment.start ? 'As loaded' : data.foreign ? `Frame ${moment.frame}` : `Frame ${moment.frame}, after ${moment.stage}`);
 
 function header() {
   const name = data.scene || 'a recording';
   document.title = `${data.checked ? (data.holds ? 'Holds: ' : 'Fails: ') : ''}${name} · cutproof report`;
   byId('title').textContent = name;
   const kind = !data.checked ? 'muted' : data.holds ? 'good' : 'bad';
-  byId('summary').append(element('span', { class: `badge ${kind}`, text: !data.checked ? 'not judged' : data.holds ? '✓ holds' : '✕ fails' }), element('span', { text: data.summary }));
-  const facts = [`${plural(data.body.particles, 'particle')}`, `h = ${figure(1e3 * data.body.spacing)} mm`, `${plural(data.frames.frame.filter((frame) => frame >= 0).length, 'frame')}`];
+  byId('summary').append(badge(kind, !data.checked ? 'not judged' : data.holds ? 'holds' : 'fails'), element('span', { text: data.summary }));
+  const facts = [`${plural(data.body.particles, 'particle')}`, `h = ${figure(1e3 * data.body.spacing)} mm`, data.command !== 'check_state' && plural(data.frames.frame.filter((frame) => frame >= 0).length, 'frame')].filter(Boolean);
   if (data.checked) facts.push(plural(data.verdicts, 'verdict'));
-  facts.push(`cutproof ${data.judgedBy || data.program}`);
+  if (data.judgedBy && data.judgedBy !== data.made.program) facts.push(`judged by cutproof ${data.judgedBy}`);
   byId('facts').textContent = facts.join(' · ');
+  sayMade(data.made);
 }
 
 // --- The view and its player
 
-const look = { skin: true, particles: false, removed: false, colouring: null };
+const look = { skin: true, particles: false, removed: false, way: true, colouring: null };
 const canvas = element('canvas', { id: 'canvas', tabindex: 0, role: 'application', 'aria-label': '3D view. Arrow keys turn it, plus and minus come nearer and go away, 0 goes back; space plays, comma and full stop go back and on. C cuts the body open; brackets move the cut, Alt with arrows turns it.' });
 const status = element('p', { id: 'status' });
 const witness = element('p', { id: 'witness', role: 'status' });
 const legend = element('p', { id: 'legend', class: 'small' });
 const range = element('input', { type: 'range', id: 'scrub', min: 0, max: last, step: 1, value: 0, 'aria-label': 'Moment of the run' });
-const play = element('button', { type: 'button', id: 'play', text: '▶ Play' });
+const play = element('button', { type: 'button', id: 'play' }, icon('play'), element('span', { text: 'Play' }));
 
 const frameOf = (k) => (data.moments[k].start ? -1 : data.moments[k].frame);
 const isEnd = (k) => k === last || frameOf(k + 1) !== frameOf(k);
@@ -73,6 +76,7 @@ function timeline() {
 }
 
 function controls() {
+  if (last === 0) return '';
   const button = (text, name, onclick) => element('button', { type: 'button', text, 'aria-label': name, title: name, onclick });
   play.addEventListener('click', () => setPlaying(!state.isPlaying));
   range.addEventListener('input', () => { setPlaying(false); if (view) view.hurry(); go(Number(range.value)); });
@@ -85,34 +89,37 @@ function controls() {
 }
 
 function lookControls(hasSkin) {
-  const all = colourings(Boolean(edges) && data.body.onGrid, comparison, data);
+  const all = colourings(Boolean(edges) && data.body.onGrid, comparison, { ...data, hasGroups });
   colours = all;
-  look.colouring = all.piece || all.cluster;
+  // Of two runs of somebody else's it is asked how far they are apart.
+  look.colouring = (data.foreign && all.apart) || all.piece || all.cluster || all.displacement;
   // The skin of somebody else's run says nothing of particles.
   look.skin = hasSkin && !data.foreign;
   look.particles = !look.skin;
-  const select = (label, id, options, onchange) => element('label', {}, element('span', { text: label }), element('select', { id, onchange: (event) => { onchange(event.target.value); update(); } }, ...options.map(([value, text]) => element('option', { value, text }))));
+  const select = (label, id, options, onchange) => element('label', {}, element('span', { text: label }), element('select', { id, onchange: (event) => { onchange(event.target.value); update(); } }, ...options.map(([value, text, selected]) => element('option', { value, text, selected }))));
   const shows = [['skin', 'skin'], ['particles', 'particles'], ['both', 'both']];
   return element('div', { class: 'row looks' },
     hasSkin && select('Show', 'show', data.foreign ? [shows[1], shows[0], shows[2]] : shows, (value) => { look.skin = value !== 'particles'; look.particles = value !== 'skin'; }),
-    select('Colour', 'colour', Object.entries(all).map(([key, one]) => [key, one.name]), (value) => { look.colouring = all[value]; }),
+    select('Colour', 'colour', Object.entries(all).map(([key, one]) => [key, one.name, one === look.colouring]), (value) => { look.colouring = all[value]; }),
+    view.sides[0].hasWay() && element('label', {}, element('input', { type: 'checkbox', id: 'way', checked: true, onchange: (event) => { look.way = event.target.checked; update(); } }), element('span', { text: 'blade’s way' })),
     element('label', {}, element('input', { type: 'checkbox', id: 'removed', onchange: (event) => { look.removed = event.target.checked; update(); } }), element('span', { text: 'removed' })),
     ...view.plane.controls(view.orbit),
     element('button', { type: 'button', class: 'quiet', text: 'Whole body', onclick: () => view.orbit.goHome() }));
 }
 
 function setPlaying(isPlaying) {
-  if (isPlaying && state.at === last) go(0);
+  if (isPlaying && state.at === last) go(firstSkinned());
   state.isPlaying = isPlaying;
-  play.textContent = isPlaying ? '⏸ Pause' : '▶ Play';
+  play.replaceChildren(icon(isPlaying ? 'pause' : 'play'), element('span', { text: isPlaying ? 'Pause' : 'Play' }));
   if (!isPlaying) return;
+  // Where pictures take long, frames are left out: each that is shown is sharp.
   let due = performance.now() + 1000 / kFramesPerSecond;
   const tick = async (now) => {
     if (!state.isPlaying) return;
-    if (now >= due) {
-      due = Math.max(due + 1000 / kFramesPerSecond, now);
-      if (view) view.hurry();
-      await go(nextFrame(state.at, 1));
+    if (now >= due && !(view && (view.isDue || view.isDrawing))) {
+      let next = state.at;
+      for (; due <= now && next < last; due += 1000 / kFramesPerSecond) next = nextFrame(next, 1);
+      await go(next);
       if (state.at === last) return setPlaying(false);
     }
     requestAnimationFrame(tick);
@@ -129,6 +136,7 @@ async function go(at, finding = null, spot = null) {
     for (const button of document.querySelectorAll('[data-finding]')) button.setAttribute('aria-pressed', String(Number(button.dataset.finding) === finding && finding !== null));
   }
   await update();
+  if (document.documentElement.dataset.ready) remember();
 }
 
 // Plots follow a little later while somebody scrubs: a browser draws each of them anew.
@@ -160,7 +168,7 @@ async function update() {
   const found = state.finding === null ? null : data.findings[state.finding];
   range.value = state.at;
   range.setAttribute('aria-valuetext', words(moment));
-  const facts = [data.hasPieces && plural(moment.components, 'piece'), plural(moment.clusters, data.foreign ? 'coupling group' : 'cluster'), plural(moment.particles, 'particle')].filter(Boolean);
+  const facts = [data.hasPieces && plural(moment.components, 'piece'), hasGroups && plural(moment.clusters, data.foreign ? 'coupling group' : 'cluster'), plural(moment.particles, 'particle')].filter(Boolean);
   if (moment.time !== undefined) facts.unshift(`${figure(moment.time)} s`);
   if (data.foreign && moment.swept.length) facts.push('the blade is in the tissue');
   if (moment.removed > 0) facts.push(`${count(moment.removed)} removed in this frame`);
@@ -217,6 +225,48 @@ function momentOf(frame, stage) {
   return best;
 }
 
+// The first moment that shows what is looked for: the start of a run of ours has no skin.
+function firstSkinned() {
+  const { frame, triangles } = data.frames;
+  const k = look.skin ? triangles.findIndex((n) => n > 0) : -1;
+  return k < 0 ? 0 : momentOf(frame[k], 'skin');
+}
+
+// Where a page opens: at the first failure; where all holds, at the last frame that cut.
+function openingMoment() {
+  if (data.foreign) return data.opens < 0 ? 0 : momentOf(data.opens, 'skin');
+  const cuts = data.frames.frame.filter((_, k) => data.frames.removed[k] > 0);
+  return cuts.length ? momentOf(cuts[cuts.length - 1], 'skin') : last;
+}
+
+// --- Links to a moment and a verdict: #frame=46&stage=split&verdict=split+exactness
+
+// A little later while somebody scrubs: browsers take few addresses at once.
+let remembered = null;
+function remember() {
+  clearTimeout(remembered);
+  remembered = setTimeout(writeLink, 400);
+}
+function writeLink() {
+  const moment = data.moments[state.at], finding = state.finding === null ? null : data.findings[state.finding];
+  const link = new URLSearchParams({ frame: frameOf(state.at) });
+  if (!data.foreign && moment.stage !== 'skin') link.set('stage', moment.stage);
+  if (finding) link.set('verdict', finding.property);
+  history.replaceState(null, '', `#${link}`);
+}
+
+// Whether the address names a place of this page, to which it goes.
+async function goToLink() {
+  const link = new URLSearchParams(location.hash.slice(1)), property = link.get('verdict'), frame = Number(link.get('frame'));
+  openLinked(link);
+  if (!link.has('frame') && !property) return false;
+  const isIt = (finding) => finding.property === property && (!link.has('frame') || finding.frame === frame) && (!link.has('stage') || finding.stage === link.get('stage'));
+  const k = data.findings.findIndex(isIt);
+  if (k >= 0) await showFinding(k, false);
+  else if (Number.isFinite(frame)) await go(momentOf(frame, link.get('stage') || 'skin'));
+  return true;
+}
+
 async function jump(frame, stage) {
   setPlaying(false);
   await go(momentOf(frame, stage));
@@ -237,12 +287,13 @@ async function showApart(frame, stage) {
   byId('view').scrollIntoView({ block: 'nearest' });
 }
 
-async function showFinding(k) {
+// At the top of a page that opens stands what is to be read first.
+async function showFinding(k, scrolls = true) {
   setPlaying(false);
   const { marks } = data.findings[k];
   await go(Math.max(marks.moment, 0), k);
   if (view) view.flyToMarks();
-  byId('view').scrollIntoView({ block: 'nearest' });
+  if (scrolls) byId('view').scrollIntoView({ block: 'nearest' });
 }
 
 // --- Put together
@@ -251,13 +302,14 @@ function findings() {
   const section = byId('findings');
   const failing = data.findings.filter((one) => !one.expected);
   byId('findings-title').textContent = failing.length ? 'What fails' : !data.checked ? 'Nothing was judged' : data.holds ? 'Nothing fails' : 'It does not hold';
-  if (comparison) section.append(comparisonCard(comparison, showApart));
   if (!data.checked) section.append(element('p', { text: 'This page shows what happened. Whether it is right, this command judges:' }));
   if (data.checked && data.holds && !failing.length) {
     const near = data.rows.filter((row) => row.judged > 0 && row.ofBound !== null).sort((a, b) => b.ofBound - a.ofBound)[0];
-    section.append(element('p', { text: `All that was judged holds${data.findings.length ? ', but for what the scene expects to fail' : ''}.${near ? ` The nearest to its bound is ${near.property}${data.foreign ? '' : ` after ${near.stage}`}, at ${figure(near.ofBound)} of it, in frame ${near.frame}.` : ''}` }));
+    section.append(element('p', { text: `All that was judged holds${data.findings.length ? ', but for what the scene expects to fail' : ''}.${near ? ` The nearest to its bound is ${near.property}${data.foreign ? '' : ` after ${near.stage}`}, at ${figure(near.ofBound)} of the bound, in frame ${near.frame}.` : ''}` }));
   }
-  section.append(...cards(data, showFinding));
+  const apart = comparison && comparisonCard(comparison, data.foreign, showApart);
+  // What was judged of somebody else's is what fails; of our own the distance was asked for.
+  section.append(...(data.foreign ? [...cards(data, showFinding), apart] : [apart, ...cards(data, showFinding)]).filter(Boolean));
   if (data.findingsLeftOut > 0) section.append(element('p', { class: 'muted', text: `${plural(data.findingsLeftOut, 'later failure')} of the same properties are counted in the table, and not shown.` }));
   section.append(element('h3', { text: data.checked ? 'See it again' : 'Judge it' }), command(data.again));
   const notes = [...data.notReached.map((text) => `Not reached: ${text}`), ...data.notes];
@@ -311,10 +363,11 @@ async function main() {
     event.preventDefault();
     keys[event.key]();
   });
-  // Somebody else's run opens where it first fails, or where the blade has parted tissue last.
-  if (!data.foreign) await go(0);
-  else if (data.findings.length) await showFinding(0);
-  else await go(data.lastCut < 0 ? 0 : momentOf(data.lastCut, 'skin'));
+  addEventListener('hashchange', goToLink);
+  if (!await goToLink()) {
+    if (data.findings.length && !data.findings[0].expected) await showFinding(0, false);
+    else await go(openingMoment());
+  }
   document.documentElement.dataset.ready = 'true';
 }
 

@@ -122,7 +122,7 @@ export function plotsOf(data, jump) {
     const lines = (title, column, unit, words) => found.push(plot({ title, words, unit, frames: ends.frame, series: [{ name: unit, values: ends[column] }], kind: 'lines', whole: true, jump }));
     if (data.hasPieces) lines('Pieces of tissue', 'components', 'pieces', changes('components', first('components') === 1 ? 'piece' : 'pieces'));
     const groups = data.foreign ? 'coupling groups' : 'clusters';
-    lines(data.foreign ? 'Coupling groups' : 'Clusters', 'clusters', groups, changes('clusters', groups));
+    if (greatest('clusters') > 0) lines(data.foreign ? 'Coupling groups' : 'Clusters', 'clusters', groups, changes('clusters', groups));
     if (greatest('removed') > 0) {
       const all = ends.removed.reduce((a, b) => a + b, 0);
       lines('Particles removed', 'removed', 'particles', `${count(all)} of ${count(data.body.particles)} in all.`);

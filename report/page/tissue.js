@@ -3,7 +3,7 @@
 // colour for each particle and nothing else.
 import {
   BoxBufferGeometry, BufferAttribute, BufferGeometry, Color, DoubleSide, EdgesGeometry, Group, Line, LineBasicMaterial,
-  LineSegments, Matrix4, Mesh, Points, PointsMaterial, ShaderMaterial, Vector3,
+  LineSegments, Matrix4, Mesh, MeshBasicMaterial, Points, PointsMaterial, ShaderMaterial, Vector3,
 } from 'three';
 import { kNowhere, kStride, places, scaleOf } from './coding.js';
 import { kDead, kTissue } from './colours.js';
@@ -103,6 +103,21 @@ function facingOf(corners) {
   return size > 0.5 * all ? sum.map((x) => x / size) : null;
 }
 
+// Patches of four corners each [m], and their rims, where neighbours do not share them.
+function putPatches(faces, rims, patches, centre, spacing) {
+  const corners = Float32Array.from(patches, (x, k) => (x - centre[k % 3]) / spacing);
+  const surface = [], lines = [];
+  for (let first = 0; first < corners.length / 3; first += 4) {
+    for (const c of [0, 1, 2, 0, 2, 3]) surface.push(first + c);
+    for (const c of [0, 1, 1, 2, 2, 3, 3, 0]) lines.push(first + c);
+  }
+  for (const [made, index] of [[faces, surface], [rims, lines]]) {
+    write(made.geometry, 'position', corners, 3);
+    write(made.geometry, 'index', new Uint32Array(index), 1);
+    made.geometry.setDrawRange(0, index.length);
+  }
+}
+
 export class Tissue {
   constructor(data, plane) {
     this.data = data;
@@ -133,9 +148,33 @@ export class Tissue {
     if (data.foreign) this.makeSwept(add);
   }
 
+  // The whole way of the blade's edge, of each moment of somebody else's run what it has swept: four corners each [m].
+  way() {
+    if (this.data.foreign) return this.data.moments.flatMap((moment) => moment.swept);
+    const corners = [], half = this.data.blade ? this.data.blade.size[0] / 2 : 0;
+    const end = (places, k, side) => [0, 1, 2].map((c) => places[6 * k + c] + side * half * places[6 * k + 3 + c]);
+    for (const places of this.data.blade ? this.data.blade.way : []) {
+      for (let k = 0; k + 1 < places.length / 6; ++k) corners.push(...end(places, k, -1), ...end(places, k, 1), ...end(places, k + 1, 1), ...end(places, k + 1, -1));
+    }
+    return corners;
+  }
+
+  hasWay() { return this.way().length > 0; }
+
+  // Pale, with its outline: where the blade is, and what it does there, must be seen before it.
+  makeWay(centre, spacing) {
+    const patches = new Mesh(new BufferGeometry(), new MeshBasicMaterial({ color: 0x7d93a8, transparent: true, opacity: 0.13, side: DoubleSide, depthWrite: false }));
+    const rims = new LineSegments(new BufferGeometry(), new LineBasicMaterial({ color: 0x7d93a8, transparent: true, opacity: 0.75 }));
+    putPatches(patches, rims, this.way(), centre, spacing);
+    for (const made of [patches, rims]) [made.frustumCulled, made.renderOrder] = [false, 0.5];
+    this.ofWay = new Group();
+    this.ofWay.add(patches, rims);
+    this.body.add(this.ofWay);
+  }
+
   makeBlade() {
     const h = this.data.body.spacing;
-    const [length, depth, thickness] = this.data.blade.map((x) => x / h);
+    const [length, depth, thickness] = this.data.blade.size.map((x) => x / h);
     const box = new BoxBufferGeometry(length, Math.max(thickness, 0.05), depth);
     box.translate(0, 0, depth / 2);
     const steel = new ShaderMaterial(surfaceShader({ value: { x: 0, y: 0, z: 0, w: 1e9 } }));
@@ -160,24 +199,13 @@ export class Tissue {
 
   // patches: of each four corners, three numbers each [m]. Returns the legend.
   showSwept(patches, isFaded, centre, spacing) {
-    const corners = Float32Array.from(patches, (x, k) => (x - centre[k % 3]) / spacing);
-    const faces = [], rims = [];
-    for (let first = 0; first < corners.length / 3; first += 4) {
-      for (const c of [0, 1, 2, 0, 2, 3]) faces.push(first + c);
-      for (const c of [0, 1, 1, 2, 2, 3, 3, 0]) rims.push(first + c);
-    }
-    const tint = new Uint8Array((4 * corners.length) / 3);
+    const tint = new Uint8Array((4 * patches.length) / 3);
     for (let i = 0; i < tint.length; i += 4) tint.set([184, 204, 224, 255], i);
-    write(this.swept.geometry, 'position', corners, 3);
     write(this.swept.geometry, 'tint', tint, 4, true);
-    write(this.swept.geometry, 'index', new Uint32Array(faces), 1);
-    this.swept.geometry.setDrawRange(0, faces.length);
-    write(this.sweptRims.geometry, 'position', corners, 3);
-    write(this.sweptRims.geometry, 'index', new Uint32Array(rims), 1);
-    this.sweptRims.geometry.setDrawRange(0, rims.length);
+    putPatches(this.swept, this.sweptRims, patches, centre, spacing);
     this.swept.material.uniforms.fade.value = isFaded ? kBladeBesideMarks : kBlade;
-    this.swept.visible = this.sweptRims.visible = faces.length > 0;
-    return faces.length ? 'Steel: what the blade has swept on the way to this frame.' : '';
+    this.swept.visible = this.sweptRims.visible = patches.length > 0;
+    return patches.length ? 'Steel: what the blade has swept on the way to this frame.' : '';
   }
 
   static scale(material, moment, centre, spacing) {
@@ -239,7 +267,11 @@ export class Tissue {
       this.steel.uniforms.fade.value = marks ? kBladeBesideMarks : kBlade;
       this.steel.depthTest = !marks && !hasParticles;
     }
-    const blade = this.swept ? this.showSwept(about.swept, Boolean(marks), centre, spacing) : '';
+    if (!this.ofWay) this.makeWay(centre, spacing);
+    this.ofWay.visible = look.way && !marks && !look.isCut;
+    const isWaySeen = this.ofWay.visible && this.hasWay();
+    const steel = this.swept ? this.showSwept(about.swept, Boolean(marks), centre, spacing) : about.blade ? 'Steel: the blade.' : '';
+    const blade = [steel, isWaySeen && 'Pale: the way of its edge.'].filter(Boolean).join(' ');
     this.showMarks(moment, marks, isRing, placesOfIt, centre, spacing);
     return { words, scale, keys, blade };
   }

@@ -1,6 +1,6 @@
 // What fails, each with its witness; and a table of every property.
-import { count, element, plural } from './dom.js';
-import { sourceInWords } from './sources.js';
+import { count, element, icon, plural } from './dom.js';
+import { nameNode, sourceNodes } from './sources.js';
 
 const withUnit = (text, unit) => (unit ? `${text} ${unit}` : text);
 
@@ -26,48 +26,63 @@ function bar(row, fails) {
   const filled = element('span', { class: fails ? 'filled bad' : 'filled' });
   filled.style.width = `${(100 * share) / 1.25}%`;
   const limit = element('span', { class: 'limit' });
-  const text = row.ofBound >= 100 ? `${row.ofBound.toExponential(1).replace('e+', 'e')} times the bound` : `${Number(row.ofBound.toPrecision(2))} of it`;
+  const text = row.ofBound >= 100 ? `${row.ofBound.toExponential(1).replace('e+', 'e')} times the bound` : String(Number(row.ofBound.toPrecision(2)));
   return element('span', { class: 'measure' }, element('span', { class: 'bar', 'aria-hidden': 'true' }, filled, limit), element('span', { class: 'share', text }));
 }
 
 function statusOf(row, data) {
-  if (row.failed > 0) return ['bad', '✕ fails'];
+  if (row.failed > 0) return ['bad', 'fails'];
   if (row.expected > 0) return ['warn', '! fails, as expected'];
   if (row.judged === 0) return ['muted', data.foreign ? '– not judged' : '– nothing to look at'];
-  if (row.undecided > 0) return ['good', '✓ holds, some within rounding'];
-  return ['good', '✓ holds'];
+  return ['good', row.undecided > 0 ? 'holds, some within rounding' : 'holds'];
+}
+
+export const exactWords = (n) => `${count(n)} exact ${n === 1 ? 'property holds' : 'properties hold'}`;
+// It counts, and has no margin.
+const isExact = (row) => row.judged > 0 && row.failed + row.expected === 0 && row.ofBound === null;
+
+// Many rows of which none says more than the others, behind one that opens.
+export function folded(rows, words, columns = 6) {
+  const body = element('tbody', { hidden: true }, ...rows);
+  const button = element('button', { type: 'button', class: 'quiet', 'aria-expanded': 'false', text: words, onclick: () => {
+    body.hidden = !body.hidden;
+    button.setAttribute('aria-expanded', String(!body.hidden));
+  } });
+  return [element('tbody', {}, element('tr', { class: 'fold' }, element('th', { scope: 'row', colspan: columns }, button))), body];
 }
 
 export function table(data, jump) {
-  const body = element('tbody');
+  const shown = [], exact = [], others = [];
   for (const row of data.rows) {
     const [kind, words] = statusOf(row, data);
     const fails = row.failed + row.expected > 0;
     const details = [];
-    if (row.failed > 0 && data.foreign) details.push('its first failure is shown');
+    if (row.failed > 0 && data.foreign && row.judged === 1) details.push('its first failure is shown');
     else if (row.failed > 0) details.push(`${count(row.failed)} of ${plural(row.judged, 'verdict')} fail`);
     else if (row.expected > 0) details.push(`${count(row.expected)} of ${plural(row.judged, 'verdict')} fail, which the scene expects`);
     else if (row.judged > 0) details.push(data.foreign ? `${count(row.checked)} looked at` : plural(row.judged, 'verdict'));
     else details.push(row.vacuous || 'there was nothing to look at');
     if (row.undecided > 0) details.push(`${plural(row.undecided, 'thing')} undecidable within rounding, counted as right`);
-    body.append(element('tr', { class: fails ? kind : null },
-      element('th', { scope: 'row' }, element('span', { text: row.property }), !data.foreign && element('span', { class: 'muted small', text: ` after ${row.stage}` })),
-      element('td', {}, element('span', { class: `status ${kind}`, text: words }), element("span", { class: "muted small block", text: details.join('; ') })),
+    (isExact(row) ? exact : row.judged > 0 ? shown : others).push(element('tr', { class: fails ? kind : null },
+      element('th', { scope: 'row' }, nameNode(row.property, data.command), !data.foreign && element('span', { class: 'muted small', text: ` after ${row.stage}` })),
+      element('td', {}, element('span', { class: `status ${kind}` }, icon(kind), element('span', { text: words })), element("span", { class: "muted small block", text: details.join('; ') })),
       element('td', {}, row.judged > 0 && bar(row, fails)),
       element('td', { class: 'figures' }, row.judged > 0 && element('span', { text: withUnit(row.measured, row.unit) }), row.judged > 0 && element('span', { class: 'muted small block', text: `bound ${withUnit(row.bound, row.unit)}` })),
-      element('td', {}, row.judged > 0 && element('button', { type: 'button', class: 'quiet', text: `frame ${row.frame}`, 'aria-label': `Show frame ${row.frame}${data.foreign ? '' : `, after ${row.stage}`}: ${fails ? 'where' : 'the nearest to the bound of'} ${row.property}${fails ? ' fails first' : ''}`, onclick: () => jump(row.frame, row.stage) })),
-      element('td', { class: 'muted small', text: sourceInWords(row.source) })));
+      element('td', {}, row.judged > 0 && data.moments.length > 1 && element('button', { type: 'button', class: 'quiet', text: `frame ${row.frame}`, 'aria-label': `Show frame ${row.frame}${data.foreign ? '' : `, after ${row.stage}`}: ${fails ? 'where' : 'the nearest to the bound of'} ${row.property}${fails ? ' fails first' : ''}`, onclick: () => jump(row.frame, row.stage) })),
+      element('td', { class: 'muted small' }, ...sourceNodes(row.source))));
   }
   const head = ['Property', 'Result', 'Measured / bound', 'Measured', fails(data) ? 'First failure, or nearest to the bound' : 'Nearest to the bound', 'Where the bound comes from'];
   return element('div', { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': 'Every property' }, element('table', { class: 'verdicts' },
-    element('thead', {}, element('tr', {}, ...head.map((text) => element('th', { scope: 'col', text })))), body));
+    element('thead', {}, element('tr', {}, ...head.map((text) => element('th', { scope: 'col', text })))), element('tbody', {}, ...shown),
+    ...(exact.length ? folded(exact, exactWords(exact.length)) : []),
+    ...(others.length ? folded(others, `${plural(others.length, 'property', 'properties')} ${data.foreign ? 'not judged' : 'with nothing to look at'}`) : [])));
 }
 
 const fails = (data) => data.rows.some((row) => row.failed + row.expected > 0);
 
 // One card for each property and stage that fails, with its first witness; its later ones behind it.
 export function cards(data, show) {
-  const groups = new Map();
+  const groups = new Map(), isLone = data.moments.length < 2;  // a state has no frames
   data.findings.forEach((finding, k) => {
     const key = `${finding.property}\n${finding.stage}`;
     if (!groups.has(key)) groups.set(key, []);
@@ -81,12 +96,12 @@ export function cards(data, show) {
     const text = element('p', { class: 'witness', text: first.text || 'It has no witness.' });
     const marks = first.marks.particles.length + first.marks.path.length + first.marks.members.length > 0;
     found.push(element('article', { class: `card ${first.expected ? 'warn' : 'bad'}` },
-      element('h3', {}, element('span', { text: first.property }), !data.foreign && element('span', { class: 'muted', text: ` after ${first.stage}` })),
+      element('h3', {}, nameNode(first.property, data.command), !data.foreign && element('span', { class: 'muted', text: ` after ${first.stage}` })),
       text,
-      element('p', { class: 'muted small' }, first.measured !== 'nothing' && element('span', { text: `Measured ${withUnit(first.measured, first.unit)}, bound ${withUnit(first.bound, first.unit)} (${sourceInWords(first.source)}). ` }),
+      element('p', { class: 'muted small' }, first.measured !== 'nothing' && element('span', {}, `Measured ${withUnit(first.measured, first.unit)}, bound ${withUnit(first.bound, first.unit)} (`, ...sourceNodes(first.source), '). '),
         element('span', { text: row && row.failed + row.expected > 1 ? `It fails in ${count(row.failed + row.expected)} of ${plural(row.judged, 'verdict')}.` : '' }),
         first.expected && element('span', { text: ' The scene expects it to fail.' })),
-      element('div', { class: 'row' }, button(members[0], marks ? `Show me: frame ${first.frame}` : `Go to frame ${first.frame}`)),
+      element('div', { class: 'row' }, button(members[0], isLone ? 'Show me' : marks ? `Show me: frame ${first.frame}` : `Go to frame ${first.frame}`)),
       members.length > 1 && element('details', {}, element('summary', { text: `Again in ${plural(members.length - 1, 'later verdict')}` }),
         element('ul', { class: 'again-in' }, ...members.slice(1).map((k) => element('li', {}, button(k, `frame ${data.findings[k].frame}`), element('span', { class: 'small', text: ` ${data.findings[k].text}` })))))));
   }

@@ -5,6 +5,8 @@ import { CutPlane } from './cut_plane.js';
 import { Orbit } from './orbit.js';
 import { Tissue } from './tissue.js';
 
+// A run that needs the camera so many times farther away than the body as it began is not fitted as a whole.
+const kFarthest = 2;
 // A body of fewer particles is small. Beside what is marked, the view's middle lies so far towards that of the body.
 const kSmallBody = 1000, kTowardsMiddle = 0.3, kTowardsMiddleOfSmall = 0.5;
 
@@ -69,7 +71,7 @@ export class View {
     this.edges = edges;
     this.first = moment;
     this.plane.begin(this.radius);
-    for (const { body } of this.sides) body.add(this.plane.outline.clone());
+    for (const side of this.sides) side.body.add(side.outline = this.plane.outline.clone());
     this.resize();
     this.orbit.at = { ...this.orbit.home, target: [...this.orbit.home.target] };
     this.orbit.place();
@@ -82,31 +84,56 @@ export class View {
     return radius / Math.sin(across);
   }
 
-  // So far away that the body, as it began, fills the view.
-  distanceForAll() {
+  // As the body is turned.
+  turned(p) {
+    const m = this.data.body.orientation;
+    return [0, 3, 6].map((k) => m[k] * p[0] + m[k + 1] * p[1] + m[k + 2] * p[2]);
+  }
+
+  // Corners of the box of all that is alive at the end of any frame, and of the body as it began.
+  cornersOfRun() {
+    const spacing = this.data.body.spacing || 1;
+    const [low, high] = this.data.reach.map((end, side) => end.map((x, k) => {
+      const run = (x - this.centre[k]) / spacing, half = this.extent[k] / 2;
+      return side === 0 ? Math.min(run, -half) : Math.max(run, half);
+    }));
+    return Array.from({ length: 8 }, (_, corner) => [0, 1, 2].map((k) => ((corner >> k) & 1 ? high : low)[k]));
+  }
+
+  // From where the whole run fills the view; what has flown far away does not count, and the view goes along with
+  // somebody else's run.
+  fitHome() {
+    const from = (target, points) => this.distanceFrom(target, points.map((p) => this.turned(p)));
+    const begun = [];
+    const every = 3 * Math.max(1, Math.floor(this.start.length / 30000));
+    for (let i = 0; i < this.start.length; i += every) {
+      if (!Number.isNaN(this.start[i])) begun.push(this.start.subarray(i, i + 3));
+    }
+    const home = this.orbit.home, begins = 1.12 * from([0, 0, 0], begun);
+    home.distance = begins;
+    if (this.data.foreign) return;
+    const corners = this.cornersOfRun();
+    const middle = this.turned([0, 1, 2].map((k) => (corners[0][k] + corners[7][k]) / 2));
+    // Little of a box lies at its corners.
+    const all = Math.max(0.88 * from(middle, corners), from(middle, begun));
+    if (all > kFarthest * begins) return;
+    home.target = middle;
+    home.distance = 1.06 * all;
+  }
+
+  // How far away the camera must be from the target for all of these points to be seen.
+  distanceFrom(target, points) {
     const { around, above } = this.orbit.home;
     const up = Math.tan((this.camera.fov * Math.PI) / 360), across = up * this.camera.aspect;
-    const m = this.data.body.orientation;
     let most = 1;
-    const add = (p) => {
-      const [x, y, z] = [0, 3, 6].map((k) => m[k] * p[0] + m[k + 1] * p[1] + m[k + 2] * p[2]);
+    for (const p of points) {
+      const [x, y, z] = p.map((c, k) => c - target[k]);
       const out = x * Math.cos(around) + y * Math.sin(around);
       const right = Math.abs(-x * Math.sin(around) + y * Math.cos(around)) + 1;
       const high = Math.abs(z * Math.cos(above) - out * Math.sin(above)) + 1;
       most = Math.max(most, Math.max(right / across, high / up) + out * Math.cos(above) + z * Math.sin(above));
-    };
-    const every = 3 * Math.max(1, Math.floor(this.start.length / 30000));
-    for (let i = 0; i < this.start.length; i += every) {
-      if (!Number.isNaN(this.start[i])) add(this.start.subarray(i, i + 3));
     }
-    // With room for the blade; and for what moves, unless the body would become small for it, or the view goes along.
-    const begins = 1.12 * most;
-    if (this.data.foreign) return begins;
-    const spacing = this.data.body.spacing || 1;
-    for (let corner = 0; corner < 8; ++corner) {
-      add([0, 1, 2].map((k) => (this.data.reach[(corner >> k) & 1][k] - this.centre[k]) / spacing));
-    }
-    return Math.min(Math.max(begins, 0.85 * most), 1.4 * begins);
+    return most;
   }
 
   // Where each run is drawn, in pixels of the page from the lower left: beside each other, or one above the other in a
@@ -124,7 +151,7 @@ export class View {
     const [, , width, height] = this.parts()[0];
     this.camera.aspect = width / height;
     const was = this.orbit.home.distance;
-    this.orbit.home.distance = this.distanceForAll();
+    this.fitHome();
     this.orbit.at.distance *= this.orbit.home.distance / was;
     this.orbit.place();
     this.render();  // at once: a canvas of another size is empty
@@ -212,8 +239,7 @@ export class View {
         this.renderer.setClearColor(back);
         this.renderer.clear();
       }
-      const outline = side.body.children[side.body.children.length - 1];
-      outline.visible = this.plane.isOn;
+      side.outline.visible = this.plane.isOn;
       this.renderer.render(this.scene, this.camera);
     });
     this.canvas.dataset.drawn = this.isQuick ? 'quick' : 'sharp';

@@ -32,7 +32,7 @@ Sheet bench_sheet(const Field& document) {
       sheet.pieces.clear();
     }
     // What is worse than the document says is said as it is.
-    if (sheet.holds && !*sheet.holds && sheet.badge != "✕ incomplete") sheet.badge = "✕ fails";
+    if (sheet.holds && !*sheet.holds && sheet.badge != "incomplete") sheet.badge = "fails";
     return sheet;
   }
   std::string known;

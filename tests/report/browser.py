@@ -128,6 +128,16 @@ class Browser:
         self.driver.execute_async_script("const done = arguments[0];"
                                          "requestAnimationFrame(() => requestAnimationFrame(() => done()));")
 
+    def unfold(self):
+        """Every row of a table."""
+        self.ask("for (const one of document.querySelectorAll('.fold button[aria-expanded=false]')) one.click()")
+
+    def go_to(self, link):
+        """Opens the page by a link."""
+        self.driver.get("about:blank")
+        self.driver.get(self.url + link)
+        self.until("return document.documentElement.dataset.ready === 'true'")
+
     def scrub(self, moment):
         self.ask("const range = document.getElementById('scrub'); range.value = arguments[0];"
                  "range.dispatchEvent(new Event('input'));", moment)

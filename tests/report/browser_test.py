@@ -4,7 +4,6 @@ Usage: browser_test.py CUTPROOF CXX SOURCES WORK
 Exit status 77, with the name of what is missing, where there is no Chromium, no driver of it or no selenium."""
 import json
 import pathlib
-import re
 import sys
 
 from browser import Browser, By, Folder, Keys
@@ -12,15 +11,6 @@ from browser import Browser, By, Folder, Keys
 program, cxx, sources = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
 work = Folder(sys.argv[4], program)
 run = work.run
-
-# --- Titles of sections are those of the document ---
-
-titles = [line.split(". ", 1)[1] for line in (sources / "docs/design/method.md").read_text().splitlines()
-          if line.startswith("## ")]
-given = re.search(r"kSections = \[(.*?)\]", (sources / "report/page/sources.js").read_text(), re.S)[1]
-given = re.findall(r"'([^']+)'", given)
-assert len(given) == len(titles), (given, titles)
-assert all(title.lower().startswith(one) for one, title in zip(given, titles)), (given, titles)
 
 # --- Three runs: one that holds, one that fails after split, and one whose names are hostile ---
 
@@ -51,6 +41,18 @@ with Browser(work / "holds.html") as page:
     assert page.text("#findings-title") == "Nothing fails"
     assert not page.driver.find_elements(By.CSS_SELECTOR, "[data-finding]")
     last = page.data("moments.length") - 1
+    # It opens at the last frame that cut, with skin, blade and the blade's way.
+    cut = max(frame for frame, n in zip(page.data("frames.frame"), page.data("frames.removed")) if n > 0)
+    at = [k for k, one in enumerate(page.data("moments"))
+          if (one["frame"], one["stage"], one["start"]) == (cut, "skin", False)]
+    page.shown(at[0])
+    assert not page.driver.find_elements(By.ID, "no-skin") and "Pale" in page.text("#blade-words")
+    with_way = page.pixels()["sum"]
+    page.pixels_after(page.driver.find_element(By.ID, "way").click, {with_way})
+    page.driver.find_element(By.ID, "way").click()
+    made = page.text("#made")
+    assert " UTC" in made and "cutproof run halves.json --check motion" in made, made
+    page.scrub(0)
     assert "until then particles are shown" in page.text("#legend"), page.text("#legend")
     first = page.pixels()
     assert 0.1 < first["share"] < 0.7, f"the body fills {first['share']} of the view"
@@ -92,8 +94,27 @@ with Browser(work / "holds.html") as page:
         moment = page.data(f"moments[{k}]")
         is_without = moment["start"] or (moment["frame"] == 0 and moment["stage"] != "skin")
         assert bool(page.driver.find_elements(By.ID, "no-skin")) == is_without, moment
-    # What a bound comes from is said in words as well.
-    assert "method.md §5 (split)" in page.text("#verdicts")
+    # Exact properties are behind one row; each name is explained, by the keyboard, too.
+    fold = page.driver.find_element(By.CSS_SELECTOR, "#verdicts .fold button")
+    exact = int(fold.text.split()[0])
+    rows = "return [...document.querySelectorAll('#verdicts tbody:not([hidden]) tr:not(.fold)')].length"
+    assert exact > 20 and page.ask(rows) + exact <= len(page.data("rows"))
+    page.unfold()
+    assert page.ask(rows) == len(page.data("rows"))
+    unexplained = page.ask("return [...document.querySelectorAll('#verdicts tbody th')].filter((e) =>"
+                           " !e.querySelector('.explained, button')).map((e) => e.textContent)")
+    assert not unexplained, unexplained
+    name = page.driver.find_element(By.CSS_SELECTOR, "#verdicts .explained")
+    page.ask("arguments[0].focus()", name)
+    assert page.text("#explanation").endswith("."), page.text("#explanation")
+    name.send_keys(Keys.ESCAPE)
+    assert not page.driver.find_element(By.ID, "explanation").is_displayed()
+    # The section that a bound comes from is a link, which shows its text.
+    link = page.driver.find_element(By.LINK_TEXT, "method.md §5 (Split)")
+    page.ask("arguments[0].click()", link)
+    assert "5. Split" in page.text("#section h3"), page.text("#section")
+    page.driver.switch_to.active_element.send_keys(Keys.ESCAPE)
+    page.until("return document.getElementById('section') === null")
     # The state as loaded is no frame.
     for plot in page.driver.find_elements(By.CSS_SELECTOR, ".plot"):
         ticks = [one.text for one in plot.find_elements(By.CSS_SELECTOR, ".tick")]
@@ -114,11 +135,13 @@ for name in ("fails.html", "reported.html"):
         first = page.driver.find_element(By.CSS_SELECTOR, "[data-finding='0']")
         row = page.driver.find_element(By.CSS_SELECTOR, "#verdicts tbody tr")
         assert "fails" in row.text, f"the first row is {row.text}"
-        before = page.pixels()
-        assert before["orange"] == 0
-        first.click()
+        # It opens there.
         marks = page.data("findings[0].marks")
         assert marks["exact"] and marks["particles"]
+        page.shown(marks["moment"], 0)
+        page.scrub(0)
+        assert page.pixels()["orange"] == 0
+        first.click()
         page.shown(marks["moment"], 0)
         after = page.pixels()
         assert after["orange"] > 100, f"{after['orange']} pixels are marked"
@@ -136,6 +159,17 @@ for name in ("fails.html", "reported.html"):
         else:
             assert command == "cutproof check seen", command
             run(command, 1)
+
+# A link leads to a frame and a verdict, and the address says where somebody is.
+with Browser(work / "fails.html") as page:
+    other = page.data("findings.findIndex((one) => one.property !== 'split exactness')")
+    frame, name = page.data(f"findings[{other}].frame"), page.data(f"findings[{other}].property")
+    page.go_to(f"#frame={frame}&verdict={name.replace(' ', '+')}")
+    page.shown(page.data(f"findings[{other}].marks.moment"), other)
+    page.scrub(page.data("moments.length") - 1)
+    page.until("return location.hash === `#frame=${arguments[0]}`", page.data("moments")[-1]["frame"])
+    page.go_to("#frame=3&stage=detect")
+    assert page.text("#status").startswith("Frame 3, after detect"), page.text("#status")
 
 with Browser(work / "unjudged.html") as page:
     assert "Nothing was judged" in page.text("#summary")
@@ -171,7 +205,7 @@ for width, dark in ((390, False), (390, True), (1280, True)):
 def filtered(page, nth=0):
     """Each value of a table's filter shows its own rows, and together all."""
     select = page.driver.find_elements(By.CSS_SELECTOR, "select.filter")[nth]
-    rows = "return [...arguments[0].closest('section').querySelectorAll('tbody tr')].filter((r) => !r.hidden).length"
+    rows = "return [...arguments[0].closest('section').querySelectorAll('tbody tr:not(.fold)')].filter((r) => !r.hidden).length"
     every, seen = page.ask(rows, select), 0
     options = page.ask("return [...arguments[0].options].map((o) => o.value)", select)
     assert len(options) > 2, options

@@ -56,10 +56,15 @@ for mode in ("light", "dark"):
         nearest = min(math.dist(lab(a, matrix), lab(b, matrix)) for a, b in itertools.combinations(lines(mode), 2))
         print(f"lines, {mode}, {kind}: nearest {nearest:.1f}")
         assert nearest >= 10, (mode, kind, nearest)
-# A ramp must grow lighter all the way, however colours are seen.
+# A ramp must grow lighter all the way, and stand out from the view's ground, however colours are seen.
 for kind, matrix in SEEN.items():
-    light = [lab(colour, matrix)[0] for colour in palette("kCividis")]
+    light = [lab(colour, matrix)[0] for colour in palette("kRamp")]
     assert all(b - a > 5 for a, b in zip(light, light[1:])), (kind, light)
+    for mode, block in (("light", style), ("dark", style.split("prefers-color-scheme: dark")[1])):
+        ground = lab(re.search(r"--view: (#[0-9a-f]{6})", block)[1], matrix)
+        nearest = min(math.dist(ground, lab(colour, matrix)) for colour in palette("kRamp"))
+        print(f"ramp on {mode}, {kind}: nearest {nearest:.1f}")
+        assert nearest >= 30, (mode, kind, nearest)
 # What is marked stands out from what it lies on.
 def triple(source, name):
     found = re.search(rf"{name} = (?:packed\()?\[(\d+), (\d+), (\d+)\]", source)

@@ -98,6 +98,6 @@ int main(int argc, char** argv) {
   results.command = "recording";
   results.scene = "a bent block";
   results.backend = "made";
-  std::ofstream(argv[4]) << report::page(source, results, "cutproof check made", "1");
+  std::ofstream(argv[4]) << report::page(source, results, "cutproof check made", {"1"});
   std::printf("%d particles, %zu triangles, %d frames\n", setup.body.particle_count(), skin.triangles.size(), frames);
 }

@@ -13,6 +13,7 @@
 #include "report/assets.h"
 #include "report/beside.h"
 #include "report/changes.h"
+#include "report/document_page.h"
 #include "report/pieces.h"
 #include "tests/report/made_run.h"
 
@@ -85,6 +86,45 @@ TEST(Results, OfARunThatHoldsAndOfOneThatWasNotJudgedSaySo) {
             "cutproof ran scene block on backend mine: the one property that was judged holds, in 1 verdict.");
   holds["checked"] = false;
   EXPECT_EQ(summary_sentence(results_of(holds, "f")), "cutproof ran scene block on backend mine. Nothing was judged.");
+}
+
+// Each as its command writes it.
+TEST(Results, OfStatesKicksAndRelationsSayWhatWasJudgedAndWhereToLook) {
+  const auto made = [](const char* format, json more) {
+    json one = {{"format", format},
+                {"cutproof", "1"},
+                {"verdicts",
+                 {verdict("finite", "skin", 0, true, 0, 0), verdict("something was judged", "skin", 0, true, 1, 2)}},
+                {"summary", {{"holds", true}}},
+                {"notes", {"a note"}}};
+    one.update(more);
+    return results_of(one, "f");
+  };
+  const Results state =
+      made("cutproof.check_state", {{"source", "a.npz"},
+                                    {"body", {{"particles", 6}, {"pieces", 2}}},
+                                    {"not_judged", {{{"property", "motion"}, {"why", "one state"}}}}});
+  EXPECT_EQ(summary_sentence(state),
+            "cutproof judged the state a.npz: all 2 properties that were judged hold, in 2 verdicts. Its tissue is 2 "
+            "pieces.");
+  EXPECT_EQ(state.rows.back().vacuous, "one state");
+  for (const PropertyRow& row : state.rows) EXPECT_EQ(row.of_bound, std::nullopt) << row.property;
+  const Results kick =
+      made("cutproof.kick", {{"source", "k.npz"},
+                             {"particles", 6},
+                             {"kicks", {{{"kick_frame", 4}, {"pieces", {{{"piece", 0}}, {{"piece", 1}}}}}}}});
+  EXPECT_EQ(kick.opens, 4);
+  EXPECT_EQ(kick.pieces, "Its tissue is 2 pieces");
+  EXPECT_TRUE(kick.is_foreign());
+  const Results relate =
+      made("cutproof.relate",
+           {{"sources", {"a.h5", "b.h5"}}, {"map", "units:4,1,1"}, {"particles", 6}, {"sharpest", {{"frame", 3}}}});
+  EXPECT_EQ(relate.scene, "a.h5 and b.h5 (units:4,1,1)");
+  EXPECT_EQ(relate.opens, 3);
+  EXPECT_EQ(
+      made("cutproof.relate", {{"sources", json::array()}, {"map", "same"}, {"particles", 6}, {"sharpest", nullptr}})
+          .opens,
+      -1);
 }
 
 // Nor does what fails hold because its summary says so.
@@ -510,7 +550,7 @@ TEST(Page, HoldsNamesAsTextOnly) {
   json given = document({verdict(kHostile, "split", 0, false, 3, 1)});
   given["scene"] = given["backend"] = kHostile;
   given["verdicts"][0]["witness"]["text"] = "@SCRIPT@ @DATA@ @FIRST_CHUNK@";
-  const std::string text = page(source_of(setup, 2), results_of(given, "f"), kHostile, "1");
+  const std::string text = page(source_of(setup, 2), results_of(given, "f"), kHostile, {"1"});
   EXPECT_EQ(text.find("<script>window"), std::string::npos);
   EXPECT_EQ(text.find("@LATER_CHUNKS@"), std::string::npos) << "every mark of the template is filled";
   const std::string begin = "id=\"data\">";
@@ -522,10 +562,30 @@ TEST(Page, HoldsNamesAsTextOnly) {
   EXPECT_EQ(data.at("findings").at(0).at("text"), "@SCRIPT@ @DATA@ @FIRST_CHUNK@") << "what it holds is no mark";
 }
 
+TEST(Page, HoldsTheBladesWayByStrokesAndNotInEveryStep) {
+  auto setup = block(3);
+  setup.has_blade = true;
+  setup.blade = {1, 1, 0, 0};
+  // 400 steps down, one up, and two down.
+  for (int k = 0; k < 403; ++k) {
+    const auto pose = [](double x) { return BladePose{{x, 0, 0}, {0, 1, 0}, {0, 0, 1}}; };
+    setup.blade_moves.push_back({pose(k), pose(k + 1), k != 400, 0});
+  }
+  const json way = blade_json(setup).at("way");
+  ASSERT_EQ(way.size(), 2u);
+  EXPECT_LE(way.at(0).size(), 6u * 152);
+  EXPECT_GE(way.at(0).size(), 6u * 100);
+  EXPECT_EQ(way.at(0).at(0), 0) << "from where the stroke begins";
+  EXPECT_EQ(way.at(0).at(way.at(0).size() - 6), 400) << "to where it ends";
+  EXPECT_EQ(way.at(1).at(0), 401);
+  EXPECT_EQ(way.at(1).at(way.at(1).size() - 6), 403);
+  EXPECT_TRUE(blade_json(block(3)).is_null());
+}
+
 TEST(Page, AllowsItsOwnScriptAndNothingElse) {
   if (kPageScript.empty()) GTEST_SKIP() << "this build has no report pages";
   const auto setup = block(3);
-  const std::string text = page(source_of(setup, 2), results_of(document({}), "f"), "again", "1");
+  const std::string text = page(source_of(setup, 2), results_of(document({}), "f"), "again", {"1"});
   EXPECT_NE(text.find("default-src 'none'; script-src '" + std::string(kPageScriptHash) + "'; style-src '" +
                       std::string(kPageStyleHash) + "'; img-src data:;"),
             std::string::npos);
@@ -542,7 +602,7 @@ TEST(Page, IsUnderTwoMegabytesUpToTheFirstFrame) {
   for (int frame = 0; frame < 3000; ++frame) {
     verdicts.push_back(verdict("property " + std::to_string(frame % 50), "split", frame / 50, frame % 7 != 0, 1, 1));
   }
-  const std::string text = page(source_of(setup, 2), results_of(document(verdicts), "f"), "again", "1");
+  const std::string text = page(source_of(setup, 2), results_of(document(verdicts), "f"), "again", {"1"});
   const std::size_t later = text.find("id=\"chunk-1\"");
   ASSERT_NE(later, std::string::npos);
   EXPECT_LT(later, 2'000'000u);

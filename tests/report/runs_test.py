@@ -46,6 +46,7 @@ with Browser(path) as page:
     marks = page.data("findings[0].marks")
     assert marks["particles"] == first["witness"]["particles"] and marks["exact"], marks
     assert page.pixels()["orange"] > 0, "the witness is not seen"
+    page.unfold()
     table = page.text("#verdicts")
     assert not any(f"after {stage}" in table for stage in ("step", "skin")), table
     rows = {row["property"]: row for row in page.data("rows")}
@@ -74,6 +75,7 @@ path, document = page_of("holds", 0)
 last_cut = document["pieces"]["last_cut"]
 with Browser(path) as page:
     page.shown(last_cut)
+    assert "Pale: the way" in page.text("#blade-words"), page.text("#blade-words")
     page.picture(work / "holds.png")
     assert page.text("#findings-title") == "Nothing fails"
     assert len(page.data(f"moments[{last_cut}].swept")) == 12, page.data(f"moments[{last_cut}].swept")
