@@ -104,9 +104,6 @@ int check(const CheckOptions& options) {
     return check_run(io::RunSegments(options.recording, std::move(only)), options.recording, reports);
   }
   if (options.as_run) refuse("--as-run", "this file holds one state", "leave it out");
-  if (!options.report.empty()) {
-    refuse("--report", "of a state no page is made", "leave it out; --json has every verdict with its witness");
-  }
   return check_state(contents, options.recording, reports);
 }
 

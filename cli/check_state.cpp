@@ -8,11 +8,14 @@
 #include "cli/commands.h"
 #include "cli/findings.h"
 #include "cli/output.h"
+#include "cli/report_page.h"
 #include "cli/screen.h"
 #include "cli/terminal.h"
 #include "harness/foreign_judge.h"
 #include "model/io/array_file.h"
+#include "model/io/atomic_file.h"
 #include "model/io/verdict_json.h"
+#include "report/pieces.h"
 
 namespace cutproof::cli {
 
@@ -48,6 +51,27 @@ nlohmann::json to_json(const std::string& file, const harness::ForeignState& for
           {"notes", judged.notes}};
 }
 
+// A single moment. Of a state that is none no moment is shown, of one that is not well formed no pieces.
+void write_page_of(const harness::ForeignState& foreign, const harness::ForeignVerdicts& judged,
+                   const nlohmann::json& document, const StateReports& reports) {
+  const Body& body = foreign.setup.body;
+  State state = foreign.state;
+  state.frame = 1;
+  const auto n = static_cast<std::size_t>(body.particle_count());
+  const bool is_state = foreign.defect.empty() && state.x.size() == n && state.alive.size() == n;
+  const std::vector<int32_t> piece =
+      judged.pieces ? report::pieces_of(body, state.alive).of : std::vector<int32_t>(n, -1);
+  const report::Source source = {foreign.setup, is_state ? 1 : 0,
+                                 [&](int64_t) {
+                                   return io::Snapshot{Stage::skin, state};
+                                 },
+                                 [&](int64_t) {
+                                   return report::FrameOfRun{piece, {}, std::nullopt};
+                                 }};
+  io::write_text(reports.page, report::page(source, report::results_of(document, reports.page), reports.again,
+                                            made_by(reports.again)));
+}
+
 }  // namespace
 
 nlohmann::json not_judged_json(const std::vector<harness::NotJudged>& not_judged) {
@@ -80,8 +104,11 @@ int check_state(const io::ArrayFile& contents, const std::string& file, const St
   const harness::ForeignState foreign = harness::foreign_state_of(contents, file);
   require_writable(reports.json);
   require_writable(reports.junit);
+  require_report(reports.page);
   const harness::ForeignVerdicts judged = harness::judge_foreign_state(foreign);
-  write_document(reports.json, to_json(file, foreign, judged));
+  const nlohmann::json document = to_json(file, foreign, judged);
+  write_document(reports.json, document);
+  if (!reports.page.empty()) write_page_of(foreign, judged, document, reports);
   const Judging judging{"cutproof check", "cutproof.check.state", reports.again, Judging::Of::state};
   say("state {}: {} particles in {} clusters, {}{}\n", file, foreign.state.x.size(), foreign.state.clusters.count(),
       foreign.given.contains("nodes") ? "on a grid" : "as a graph", judged.pieces ? "; " + judged.pieces_in_words : "");

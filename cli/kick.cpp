@@ -8,8 +8,10 @@
 #include "cli/check_state.h"
 #include "cli/commands.h"
 #include "cli/findings.h"
+#include "cli/kick_page.h"
 #include "cli/options.h"
 #include "cli/output.h"
+#include "cli/report_page.h"
 #include "cli/screen.h"
 #include "cli/table.h"
 #include "cli/terminal.h"
@@ -25,7 +27,7 @@ namespace {
 
 struct KickOptions {
   std::string file;
-  std::string json, junit;
+  std::string json, junit, report;
   std::string again;  // the command line
 };
 
@@ -169,10 +171,13 @@ int kick(const KickOptions& options) {
   const harness::RecordedKick kick = harness::recorded_kick_of(io::read_array_file(options.file), options.file);
   require_writable(options.json);
   require_writable(options.junit);
-  const StateReports reports = {options.json, options.junit, "", options.again};
+  require_report(options.report);
+  const StateReports reports = {options.json, options.junit, options.report, options.again};
   const oracles::KickReport report = oracles::judge_kick(kick.runs);
   const std::vector<Verdict> verdicts = report.all();
-  write_document(options.json, to_json(options, kick, report));
+  const nlohmann::json document = to_json(options, kick, report);
+  write_document(options.json, document);
+  if (!options.report.empty()) write_kick_page(options.report, kick, report, document, options.again);
   const Judging judging{"cutproof kick", "cutproof.kick", options.again, Judging::Of::state};
   say("kick {}: {} frames of {} particles{}\n", options.file, kick.runs.frames, kick.runs.particles,
       kick.runs.kicks.size() > 1 ? fmt::format(", {} kicks", kick.runs.kicks.size()) : "");
@@ -193,6 +198,7 @@ void add_kick(CLI::App& program, Work& work) {
       ->type_name("FILE");
   add_json(*command, options->json, "write verdicts and what became of each piece");
   add_junit(*command, options->junit);
+  add_report_option(*command, options->report);
   command->callback([options, command, &work] {
     options->again = as_given(*command);
     work = [options] { return kick(*options); };

@@ -13,6 +13,8 @@
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/progress.h"
+#include "cli/relate_page.h"
+#include "cli/report_page.h"
 #include "cli/screen.h"
 #include "cli/terminal.h"
 #include "harness/related_runs.h"
@@ -29,7 +31,7 @@ struct RelateOptions {
   std::string map, make;
   std::vector<std::string> noise, dimensions;
   bool bits = false;
-  std::string json, junit;
+  std::string json, junit, report;
   std::string again;  // the command line
 };
 
@@ -143,7 +145,8 @@ int relate(const RelateOptions& options) {
   if (options.bits && !map.is_exact()) refuse("--bits", fmt::format("'{}' rounds", options.map), "leave it out");
   require_writable(options.json);
   require_writable(options.junit);
-  const StateReports reports = {options.json, options.junit, "", options.again};
+  require_report(options.report);
+  const StateReports reports = {options.json, options.junit, options.report, options.again};
   const harness::RelatedFiles files = {
       options.files[0], {options.files.begin() + 1, options.files.end()}, options.noise, options.bits};
   const harness::JudgedRelation judged = [&] {
@@ -151,7 +154,9 @@ int relate(const RelateOptions& options) {
     return harness::judge_relation(map, files, [&](int64_t frame) { progress.show(frame + 1, "judging"); });
   }();
   const std::vector<std::string> notes = notes_of(judged, !options.noise.empty());
-  write_document(options.json, to_json(options, judged, notes));
+  const nlohmann::json document = to_json(options, judged, notes);
+  write_document(options.json, document);
+  if (!options.report.empty()) write_relate_page(options.report, map, options.files, judged, document, options.again);
   const Judging judging{"cutproof relate", "cutproof.relate." + map.name(), options.again, Judging::Of::frames};
   say("relate {}: {} frames of {} particles\n", options.map, judged.frames, judged.particles);
   Shown shown{options.again};
@@ -182,6 +187,7 @@ void add_relate(CLI::App& program, Work& work) {
   command->add_flag("--bits", options->bits, "the bits must be the same, too")->excludes(make);
   add_json(*command, options->json, "write verdicts");
   add_junit(*command, options->junit);
+  add_report_option(*command, options->report);
   command->callback([options, command, &work] {
     options->again = as_given(*command);
     work = [options] { return relate(*options); };

@@ -243,7 +243,7 @@ JudgedRelation judge_related(const oracles::RunMap& map, OpenRun& first,
     if (map.needs_time() && !first.where().frame.time)
       throw InputError(first.path(), "time", "A boost needs to know when frames are.", "Write time.");
     if (judged.frames == 0) {
-      if (map.name() == "permute") relation->permute(permutation_of(first, *others.front()));
+      if (map.name() == "permute") relation->permute(judged.permutation = permutation_of(first, *others.front()));
       relation->weigh(first.mass(), second.mass());
     }
     std::vector<RelatedRun> disturbed;

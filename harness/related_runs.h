@@ -23,6 +23,7 @@ struct JudgedRelation {
   std::vector<NotJudged> not_judged;
   std::vector<std::string> notes;
   int64_t frames = 0, particles = 0;
+  std::vector<int32_t> permutation;  // of each particle of the second run, which of the first it is; empty: the same
   oracles::RelationSharpness sharpest;
   std::vector<double> differences;  // of `refine`: of each run from the next [m]
   bool holds() const;

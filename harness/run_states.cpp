@@ -43,8 +43,9 @@ void put_edges(Body& body, const Edges& edges) {
   set_edges(body, std::move(possible));
 }
 
-// Where the run does not say: the median edge, or as if the particles filled their box.
-double spacing_of(const Body& body) {
+}  // namespace
+
+double plausible_spacing(const Body& body) {
   std::vector<double> lengths;
   Vec3 low{1, 1, 1}, high;
   low = low * std::numeric_limits<double>::infinity();
@@ -67,8 +68,6 @@ double spacing_of(const Body& body) {
   const double size = norm(high - low) / std::cbrt(static_cast<double>(body.particle_count()));
   return size > 0 && std::isfinite(size) ? size : 1;
 }
-
-}  // namespace
 
 RunStates::RunStates(std::function<io::RunSegments()> open, const JudgedRun& judged)
     : open_(std::move(open)), particles_(static_cast<int32_t>(judged.particles_at_end)) {
@@ -95,7 +94,7 @@ void RunStates::make_body() {
   put_edges(body, header.edges);
   const oracles::RunCoupling* const coupling = frames_->coupling();
   if (header.edges.empty() && coupling != nullptr && coupling->corners > 0) put_edges(body, edges_of_cells(*coupling));
-  body.grid.spacing = header.spacing > 0 ? header.spacing : spacing_of(body);
+  body.grid.spacing = header.spacing > 0 ? header.spacing : plausible_spacing(body);
 }
 
 const State& RunStates::after(int64_t frame) {

@@ -10,6 +10,9 @@
 
 namespace cutproof::harness {
 
+// Of particles whose spacing nobody gives [m]: the median edge, or as if they filled their box.
+double plausible_spacing(const Body& body);
+
 class RunStates {
  public:
   // `open`: the run from its start; called again where somebody goes back. `judged`: what the run came to.

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Pages of runs of anybody's simulator in a real browser: they open where something fails, or where the blade has cut
-last; witness, pieces, coupling and the blade's sweep are seen; a large run stays small.
+"""Pages of runs, states, kicks and relations of anybody's simulator in a real browser: they open where something fails,
+or where the blade has cut last; witness, pieces, coupling and the blade's sweep are seen; a large run stays small.
 Usage: runs_test.py CUTPROOF SOURCES WORK
 Exit status 77 where there is no browser (browser.py)."""
 import json
@@ -146,4 +146,80 @@ with Browser(path) as page:
     assert len(frames) < 700 and frames[-1] == 699, frames
     # What was swept in frames that are left out is seen in the next one.
     assert sum(len(swept) for swept in page.data("moments.map((moment) => moment.swept)")) == 10 * 12
+
+# --- A state: a single moment, with its pieces; and one that is none ---
+
+line = {"positions": [[k, 0, 0] for k in range(6)], "edges": [[0, 1], [1, 2], [3, 4], [4, 5]],
+        "cluster_offsets": [0, 3, 6], "cluster_members": [0, 1, 2, 3, 4, 5]}
+states = {"apart": (line, 0), "glued": ({**line, "cluster_members": [0, 1, 3, 2, 4, 5]}, 1),
+          "senseless": ({**line, "cluster_members": [0, 1, 99, 3, 4, 5]}, 1)}
+for name, (arrays, status) in states.items():
+    numpy.savez(work / f"{name}.npz", **{key: numpy.array(value, float if key == "positions" else int)
+                                         for key, value in arrays.items()})
+    work.run([program, "check", f"{name}.npz", "--report", f"{name}.html"], status)
+    with Browser(work / f"{name}.html") as page:
+        assert f"cutproof judged the state {name}.npz" in page.text("#summary"), page.text("#summary")
+        page.unfold()
+        assert "not judged" in page.text("#verdicts") and "after" not in page.text("#verdicts tbody")
+        assert not page.driver.find_elements(By.ID, "scrub"), "a state has one moment"
+        if name != "senseless":
+            assert page.text("#status").startswith("The state · 2 pieces · 2 coupling groups · 6 particles")
+        if name == "glued":
+            page.shown(0, 0)
+            assert page.pixels()["orange"] > 0, "the witness is not seen"
+        page.picture(work / f"{name}.png")
+
+# --- A kick: the kicked run, coloured by its distance from the other ---
+
+frames = numpy.repeat(numpy.array(line["positions"], float)[None], 8, 0)
+kicked = frames.copy()
+kicked[4:, 3:, 2] += 0.1 * numpy.arange(1, 5)[:, None]
+for name, leak, status in (("alone", 0, 0), ("leaks", 1e-3, 1)):
+    felt = kicked.copy()
+    felt[6:, 1, 1] += leak
+    numpy.savez(work / f"{name}.npz", positions=frames, kicked=felt, piece=[0, 0, 0, 1, 1, 1], time=0.1 * numpy.arange(8))
+    work.run([program, "kick", f"{name}.npz", "--report", f"{name}.html"], status)
+    with Browser(work / f"{name}.html") as page:
+        page.shown(6 if leak else 4, 0 if leak else "")
+        assert "cutproof judged the kicks of" in page.text("#summary"), page.text("#summary")
+        assert "the run without a kick" in page.text("#legend") and "2 pieces" in page.text("#status")
+        assert "0.6 s" in page.text("#status") or not leak
+        if leak:
+            assert page.data("findings[0].property") == "no ghost force" and page.pixels()["orange"] > 0
+        moved = page.data("moments.map((moment) => moment.apart.max > 0)")
+        assert moved == [False] * 4 + [True] * 4, moved
+        page.picture(work / f"{name}.png")
+
+# --- A relation: both runs, the second brought back to where the first one is ---
+
+x = numpy.stack(numpy.meshgrid(*3 * [numpy.arange(4.0)], indexing="ij"), 3).reshape(-1, 3) * 0.01
+order = numpy.random.default_rng(2).permutation(len(x))
+for name, map_, off, status in (("mapped", "units:4,1,1", 0, 0), ("strays", "units:4,1,1", 1e-3, 1),
+                                ("mixed", "permute", 0, 0)):
+    with cutproof_run.Writer(work / f"{name}_a.h5", rest=x, spacing=0.01, promises="free") as a, \
+         cutproof_run.Writer(work / f"{name}_b.h5", rest=4 * x if map_ != "permute" else x[order],
+                             spacing=0.04 if map_ != "permute" else 0.01, promises="free",
+                             **({"permutation": order} if map_ == "permute" else {})) as b:
+        for frame in range(5):
+            now = x + [0, 0, 1e-3 * frame ** 2]
+            other = (4 * now if map_ != "permute" else now[order]).copy()
+            other[7, 0] += off * (frame == 3)
+            a.frame(now, time=0.1 * frame, groups=[range(32), range(32, 64)])
+            groups = [range(32), range(32, 64)]
+            if map_ == "permute":
+                groups = [numpy.flatnonzero(order >= 32), numpy.flatnonzero(order < 32)]
+            b.frame(other, time=0.1 * frame, groups=groups)
+    work.run([program, "relate", f"{name}_a.h5", f"{name}_b.h5", "--map", map_, "--report", f"{name}.html"], status)
+    with Browser(work / f"{name}.html") as page:
+        assert "cutproof judged whether these correspond" in page.text("#summary"), page.text("#summary")
+        sides = [one.text for one in page.driver.find_elements(By.CSS_SELECTOR, ".side")]
+        assert sides == [f"{name}_a.h5", f"{name}_b.h5"], sides
+        apart = page.data("moments.map((moment) => moment.apart.max)")
+        assert [one > 1e-9 for one in apart] == [False, False, False, off > 0, False], apart
+        if off:
+            page.shown(3, 0)
+            assert "They differ" in page.text("#comparison") and page.pixels()["orange"] > 0
+        else:
+            assert "decide differently" not in page.text("#comparison"), page.text("#comparison")
+        page.picture(work / f"{name}.png")
 print("pages of runs are as they should be")
