@@ -16,11 +16,14 @@ namespace cutproof {
 
 // A closed implicit shape, or a tree of them. Lengths in metres, in the shape's own frame.
 struct Shape {
-  enum class Kind { box, ball, kidney, liver, union_of, difference };
+  enum class Kind { box, ball, cylinder, capsule, torus, kidney, liver, union_of, difference };
   Kind kind = Kind::box;
-  Vec3 center;                  // of box, ball, kidney, liver [m]
+  Vec3 center;                  // of all but union and difference [m]
   Vec3 size = {0.1, 0.1, 0.1};  // box: side lengths; kidney, liver: extents of the bounding box [m]
-  double radius = 0.05;         // ball [m]
+  double radius = 0.05;         // ball, cylinder, capsule; torus: of the circle in the middle of its tube [m]
+  double tube = 0.02;           // torus: radius of its tube, less than `radius` [m]
+  double length = 0.1;          // cylinder: between its ends; capsule: between the centres of its caps [m]
+  Vec3 along = {0, 0, 1};       // cylinder, capsule, torus: direction of the axis, of any length but zero
   std::vector<Shape> parts;     // union: all of them; difference: the first without the others
   friend bool operator==(const Shape&, const Shape&) = default;
 };
@@ -151,8 +154,8 @@ struct Scene {
 };
 
 // Names in files, in the order of the enumerators; those of the other choices are in model/rules.h.
-inline constexpr std::array<std::string_view, 6> kShapeNames = {"box",   "ball",  "kidney",
-                                                                "liver", "union", "difference"};
+inline constexpr std::array<std::string_view, 9> kShapeNames = {"box",    "ball",  "cylinder", "capsule",   "torus",
+                                                                "kidney", "liver", "union",    "difference"};
 inline constexpr std::array<std::string_view, 2> kCookingNames = {"boxes", "sampled"};
 inline constexpr std::array<std::string_view, 2> kCurveNames = {"line", "arc"};
 inline constexpr std::array<std::string_view, 2> kDetectEveryNames = {"frame", "substep"};

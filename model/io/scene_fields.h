@@ -71,21 +71,40 @@ struct DetectFields {
 void describe(auto& v, Shape& s) {
   using enum Shape::Kind;
   v.field(s.kind, {"kind",
-                   "`box`, `ball`; `kidney`, `liver`: organs made in code; `union`: all `parts` together; "
-                   "`difference`: the first of `parts` without the others.",
+                   "`box`, `ball`, `cylinder`, `capsule`, `torus`; `kidney`, `liver`: organs made in code; `union`: "
+                   "all `parts` together; `difference`: the first of `parts` without the others.",
                    {},
                    kRequired});
   const bool made_of_parts = s.kind == union_of || s.kind == difference;
   if (v.applies(!made_of_parts)) {
+  const bool has_size = s.kind == box || s.kind == kidney || s.kind == liver;
+  const bool has_axis = s.kind == cylinder || s.kind == capsule || s.kind == torus;
     v.field(s.center,
             {"center", "Middle of the shape. Not for `union` and `difference`.", between(-kLongest, kLongest, "m")});
   }
-  if (v.applies(!made_of_parts && s.kind != ball)) {
+  if (v.applies(has_size)) {
     v.field(s.size, {"size", "Extents of the bounding box along x, y, z. Only for `box`, `kidney` and `liver`.",
                      above(0, kLongest, "m")});
   }
-  if (v.applies(s.kind == ball)) {
-    v.field(s.radius, {"radius", "Only for `ball`.", above(0, kLongest, "m")});
+  if (v.applies(s.kind == ball || has_axis)) {
+    v.field(s.radius, {"radius",
+                       "Only for `ball`, `cylinder`, `capsule` and `torus`: there of the circle in the middle of the "
+                       "tube.",
+                       above(0, kLongest, "m")});
+  }
+  if (v.applies(s.kind == torus)) {
+    v.field(s.tube, {"tube", "Radius of the tube, less than `radius`. Only for `torus`.", above(0, kLongest, "m")});
+  }
+  if (v.applies(s.kind == cylinder || s.kind == capsule)) {
+    v.field(s.length, {"length",
+                       "Only for `cylinder`, from end to end, and `capsule`: without its two round caps, which add "
+                       "`radius` each.",
+                       above(0, kLongest, "m")});
+  }
+  if (v.applies(has_axis)) {
+    v.field(s.along,
+            {"along", "Direction of the axis, of any length but zero. Only for `cylinder`, `capsule` and `torus`.",
+             between(-1e6, 1e6)});
   }
   if (v.applies(made_of_parts)) {
     v.field(s.parts,

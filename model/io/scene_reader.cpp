@@ -185,6 +185,13 @@ void check(const Shape& s, const Place& at) {
   if ((s.kind == Shape::Kind::union_of || s.kind == Shape::Kind::difference) && s.parts.empty()) {
     at.inner("parts").fail("The list of parts is empty or missing.", "Give at least one shape.");
   }
+  if (!(norm(s.along) > 1e-150)) {  // its square is a normal number
+    at.inner("along").fail("This is no direction: its length is zero.", "Give the direction of the axis: [0, 0, 1].");
+  }
+  if (s.kind == Shape::Kind::torus && s.tube >= s.radius) {
+    at.inner("tube").fail(fmt::format("A tube of radius {} closes the hole of a torus of radius {}.", s.tube, s.radius),
+                          "Give a tube less than the radius, or choose another \"kind\".");
+  }
 }
 
 std::size_t shapes_in(const Shape& shape) {

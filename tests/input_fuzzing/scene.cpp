@@ -33,10 +33,11 @@ std::vector<std::string> seeds() {
   for (const fs::path& path : paths) seeds.push_back(bytes_of_file(path.string()));
 
   Scene scene;
-  Shape ball, both;
+  Shape ball, ring, both;
   ball.kind = Shape::Kind::ball;
+  ring.kind = Shape::Kind::torus;
   both.kind = Shape::Kind::difference;
-  both.parts = {Shape{}, ball};
+  both.parts = {Shape{}, ball, ring};
   scene.body.shape = both;
   scene.body.spacing = 0.01;
   scene.walls = {{0, -1, 0.5, 0.25}};

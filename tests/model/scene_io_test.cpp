@@ -490,8 +490,17 @@ TEST(SceneIoErrors, AnUnknownFieldNamesTheNearestKnownOne) {
   tree["blade"]["strokes"][0]["pionts"] = 1;
   expect_error(tree, "blade.strokes[0].pionts", {"\"points\""});
   tree = smallest();
-  tree["body"]["shape"]["radius"] = 1;  // of balls only
+  tree["body"]["shape"]["radius"] = 1;  // not of boxes
   expect_error(tree, "body.shape.radius", {"not known here", "size"});
+  for (const auto& [kind, field] : {std::pair{"ball", "along"},
+                                    {"cylinder", "size"},
+                                    {"cylinder", "tube"},
+                                    {"capsule", "tube"},
+                                    {"torus", "length"},
+                                    {"union", "center"}}) {
+    tree["body"]["shape"] = {{"kind", kind}, {field, 1}};
+    expect_error(tree, std::string("body.shape.") + field, {"not known here", "kind"});
+  }
 }
 
 TEST(SceneIoErrors, AFieldThatIsGivenTwiceIsRefused) {
@@ -735,6 +744,10 @@ TEST(SceneIoErrors, ConditionsBetweenFieldsAreChecked) {
   tree = smallest();
   tree["body"]["shape"] = json::parse(R"({"kind": "union", "parts": []})");
   expect_error(tree, "body.shape.parts", {"empty"});
+  tree["body"]["shape"] = json::parse(R"({"kind": "cylinder", "along": [0, 0, 0]})");
+  expect_error(tree, "body.shape.along", {"no direction"});
+  tree["body"]["shape"] = json::parse(R"({"kind": "torus", "radius": 0.01, "tube": 0.01})");
+  expect_error(tree, "body.shape.tube", {"closes the hole", "less than the radius"});
 }
 
 TEST(SceneIoErrors, ShapesNestedWithoutEndAreRefused) {
