@@ -21,7 +21,7 @@ package=(dpkg-dev file)  # the libraries on which a package depends
 tests=(
   "${package[@]}" git ccache
   libgtest-dev libgmock-dev librapidcheck-dev
-  python3-h5py python3-numpy
+  python3-h5py python3-numpy python3-jsonschema
   libbullet-dev python3-scipy python3-skimage  # judged as examples: docs/results/libraries.md
   groff-base   # reads the manual page
   zsh fish     # read their completions

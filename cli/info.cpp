@@ -33,6 +33,7 @@ namespace {
 
 struct InfoOptions {
   bool scene = false;   // print the reference of scene files
+  bool schema = false;  // print the JSON Schema of scene files
   bool scenes = false;  // print the scenes that come with the program
   bool limits = false;  // print how much is read
   std::string mesh;     // examine it
@@ -126,6 +127,10 @@ int info(const InfoOptions& options, const CLI::App& program) {
     insist_text(io::scene_reference());
     return 0;
   }
+  if (options.schema) {
+    insist_as_it_is(io::scene_schema());
+    return 0;
+  }
   if (options.limits) {
     insist_text(io::limits_reference());
     return 0;
@@ -160,6 +165,7 @@ void add_info(CLI::App& program, Work& work) {
   const auto options = std::make_shared<InfoOptions>();
   CLI::App* const command = program.add_subcommand("info", "version, backends, devices, properties; or a mesh");
   command->add_flag("--scene", options->scene, "list every field of a scene file");
+  command->add_flag("--schema", options->schema, "print the JSON Schema of scene files, for editors");
   command->add_flag("--scenes", options->scenes, "list the scenes that come with the program");
   CLI::Option* const mesh =
       command

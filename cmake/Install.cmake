@@ -100,6 +100,7 @@ if(CUTPROOF_INSTALL)
     # The program reads no file by itself: scenes are for people to begin with.
     install(DIRECTORY ${PROJECT_SOURCE_DIR}/fixtures/scenes DESTINATION ${CMAKE_INSTALL_DATADIR}/cutproof
       FILES_MATCHING PATTERN "*.json")
+    install(FILES ${PROJECT_SOURCE_DIR}/fixtures/scene.schema.json DESTINATION ${CMAKE_INSTALL_DATADIR}/cutproof)
     install(DIRECTORY ${PROJECT_SOURCE_DIR}/ci/cluster DESTINATION ${CMAKE_INSTALL_DATADIR}/cutproof
       USE_SOURCE_PERMISSIONS)
     install(FILES ${CMAKE_CURRENT_LIST_DIR}/copyright ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/README.md

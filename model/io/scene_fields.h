@@ -1,6 +1,6 @@
 // The table of all fields of a scene: name, unit, bounds and meaning, once. A visitor that goes through it reads,
-// writes or documents a scene (scene_reader.cpp, scene_writer.cpp). Defaults are those of the structs in model/scene.h
-// and model/setup.h.
+// writes or documents a scene (scene_reader.cpp, scene_writer.cpp, scene_schema.cpp). Defaults are those of the structs
+// in model/scene.h and model/setup.h.
 //
 // A visitor has
 //   field(T&, const SceneField&)      T: bool, a number, std::string, Vec3, Range, an enumeration, a struct described
@@ -10,6 +10,7 @@
 #pragma once
 #include <limits>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "model/io/limits.h"
@@ -76,9 +77,9 @@ void describe(auto& v, Shape& s) {
                    {},
                    kRequired});
   const bool made_of_parts = s.kind == union_of || s.kind == difference;
-  if (v.applies(!made_of_parts)) {
   const bool has_size = s.kind == box || s.kind == kidney || s.kind == liver;
   const bool has_axis = s.kind == cylinder || s.kind == capsule || s.kind == torus;
+  if (v.applies(!made_of_parts)) {
     v.field(s.center,
             {"center", "Middle of the shape. Not for `union` and `difference`.", between(-kLongest, kLongest, "m")});
   }
@@ -337,6 +338,13 @@ void describe(auto& v, FrameFields& s) {
 }
 
 void describe(auto& v, Scene& s) {
+  std::optional<std::string> schema;  // for others
+  v.field(schema, {"$schema",
+                   "Where an editor finds the JSON Schema of scenes, which `cutproof info --schema` prints; nothing is "
+                   "read there.",
+                   {},
+                   kOptional,
+                   kMostPathBytes});
   v.field(s.version,
           {"version", "Of this format; no other is read.", between(kSceneVersion, kSceneVersion), kRequired});
   v.field(s.name, {"name", "A short name, for reports.", {}, kOptional, kMostNameBytes});

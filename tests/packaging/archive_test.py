@@ -59,6 +59,8 @@ def judge(options, root, name):
     ours = {path.name for path in (options.source / "fixtures/scenes").glob("*.json")}
     theirs = {path.name for path in scenes.glob("*")}
     expect(ours == theirs, f"{name}: scenes that only one side has: {ours ^ theirs}")
+    # Where scenes name it: "../scene.schema.json".
+    expect((scenes.parent / "scene.schema.json").is_file(), f"{name}: the schema of scenes is missing")
     # As the README says it: the scene by its name, from any folder.
     done = run([program, "run", "small_block", "--check", "topology"], **surroundings)
     expect(done.returncode == 0 and "everything holds." in done.stdout, f"{name}: cutproof run: {done.stdout}")
