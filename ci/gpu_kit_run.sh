@@ -57,7 +57,8 @@ for part in $parts; do
     failures) try device_failures_test env CUTPROOF_CALLS=all device_failures_test ;;
     scenes)
       for scene in cuboid_press uniform_stretch uniform_stretch_strain three_cuts liver_cut kidney_arc \
-          kidney_discontinuous irregular_sampled irregular_sampled_covered cluster_growth small_block kidney_101096; do
+          kidney_discontinuous irregular_sampled irregular_sampled_covered cluster_growth small_block cylinder \
+          kidney_101096; do
         try "scene_$scene" cutproof run "fixtures/scenes/$scene.json" --backend gpu --check
       done ;;
     lockstep)

@@ -50,7 +50,7 @@ std::vector<SceneOn> scenes_and_backends() {
   std::vector<SceneOn> all;
   for (const char* scene :
        {"cuboid_press", "uniform_stretch", "uniform_stretch_strain", "three_cuts", "liver_cut", "kidney_arc",
-        "kidney_discontinuous", "irregular_sampled", "irregular_sampled_covered", "small_block"}) {
+        "kidney_discontinuous", "irregular_sampled", "irregular_sampled_covered", "small_block", "cylinder"}) {
     for (const char* backend : {"reference", "host", "simulated"}) all.push_back({scene, backend, ""});
   }
   // 37,704 particles, over 10 s each: kernels go other ways where clusters and particles are many, and what the paper
