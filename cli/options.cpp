@@ -101,7 +101,8 @@ std::string as_given(const CLI::App& command) {
   std::string words, options;
   for (const CLI::Option* const option : command.get_options()) {
     const std::string name = option->get_name();
-    if (option->count() == 0 || name == "--json" || name == "--junit" || name == "--record" || name == "--report")
+    if (option->count() == 0 || name == "--json" || name == "--junit" || name == "--record" || name == "--report" ||
+        name == "--preview")
       continue;
     if (option->get_group() == kStyleGroup) continue;  // how it is printed changes nothing
     const bool is_word = option->get_lnames().empty() && option->get_snames().empty();

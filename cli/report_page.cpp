@@ -19,9 +19,9 @@ void add_report_option(CLI::App& command, std::string& path) {
       ->type_name("F");
 }
 
-void require_report(const std::string& path) {
+void require_report(const std::string& path, const std::string& option) {
   if (path.empty()) return;
-  report::require_pages("--report");
+  report::require_pages(option);
   require_writable(path);
 }
 

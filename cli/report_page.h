@@ -12,7 +12,7 @@ namespace cutproof::cli {
 void add_report_option(CLI::App& command, std::string& path);
 // A failure now rather than after the run: throws InputError if this build makes no pages, or the folder is not there
 // or not writable. Nothing if `path` is empty.
-void require_report(const std::string& path);
+void require_report(const std::string& path, const std::string& option = "--report");
 
 // Here and now. `backend`: on whose processor the work was done; empty: the reference's.
 report::Made made_by(const std::string& command, const std::string& backend = {});

@@ -16,6 +16,7 @@
 #include "cli/mesh_report.h"
 #include "cli/options.h"
 #include "cli/output.h"
+#include "cli/preview.h"
 #include "cli/progress.h"
 #include "cli/report_page.h"
 #include "cli/results.h"
@@ -55,7 +56,8 @@ struct RunOptions {
   int64_t error_frames = harness::ErrorsWanted{}.frames;
   std::string record;
   std::string json, junit, report;
-  std::string again;  // the command line
+  std::string preview;  // a page of the scene before it runs, and nothing else
+  std::string again;    // the command line
 };
 
 constexpr const char* kNextSteps =
@@ -272,6 +274,35 @@ void annotate_run(const RunSession& session, const Judging& judging) {
   print_annotations(failures, judge != nullptr ? judge->left_to_reference() : session.left_to_reference());
 }
 
+// Nothing runs, so there is nothing to judge, to compare or to write.
+void require_alone(const RunOptions& options) {
+  for (const auto& [name, value] : {std::pair{"--check", &options.check},
+                                    {"--against", &options.against},
+                                    {"--errors", &options.errors},
+                                    {"--record", &options.record},
+                                    {"--json", &options.json},
+                                    {"--junit", &options.junit},
+                                    {"--report", &options.report}}) {
+    if (!value->empty())
+      refuse("--preview", fmt::format("nothing runs, so {} has nothing to work on", name),
+             fmt::format("leave out --preview or {}", name));
+  }
+}
+
+int preview(const RunOptions& options) {
+  require_alone(options);
+  require_report(options.preview, "--preview");
+  const std::vector<io::SceneChange> changes = changes_of(options.scene);
+  const Scene scene = io::read_scene(options.scene.file, changes);
+  const fixtures::Built built = with_sources(options.scene.file, changes, [&] {
+    return fixtures::build(scene, options.scene.file, build_options_of(options));
+  });
+  print_header(scene, built, options);
+  write_preview(options.preview, scene, built, options.again + " --check");
+  print_written(options.preview);
+  return 0;
+}
+
 int run(const RunOptions& options) {
   const auto begin = std::chrono::steady_clock::now();
   const harness::Observers observers = observers_wanted(options);
@@ -385,6 +416,10 @@ void add_run(CLI::App& program, Work& work) {
   add_json(*command, options->json, "write verdicts, stage times and counts");
   add_junit(*command, options->junit);
   add_report_option(*command, options->report);
+  command
+      ->add_option("--preview", options->preview,
+                   "write a page for a browser that shows the body and the way of the blade; nothing runs")
+      ->type_name("F");
   command->callback([options, command, &work] {
     options->again = as_given(*command);
     // Whoever writes --check before the scene means no depth by it.
@@ -394,7 +429,7 @@ void add_run(CLI::App& program, Work& work) {
     work = [options] {
       if (!options->scene.file.empty()) {
         options->scene.file = scene_file(options->scene.file);
-        return run(*options);
+        return options->preview.empty() ? run(*options) : preview(*options);
       }
       print_error({kNextSteps});
       return 2;

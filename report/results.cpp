@@ -340,6 +340,7 @@ std::string subject_of(const Results& results) {
 
 std::string of_what_was_judged(const Results& results) {
   const std::string scene = results.scene.empty() ? "a scene without a name" : "scene " + results.scene;
+  if (results.command == "preview") return "This is " + scene + " before it runs: the body, and the way of the blade.";
   const std::string subject =
       results.is_foreign()       ? subject_of(results)
       : results.command == "run" ? fmt::format("cutproof ran {} on backend {}", scene, results.backend)

@@ -45,7 +45,7 @@ struct Series {
 
 struct Results {
   // "run", "check"; "recording": there are no results; of somebody else's simulator "check_run", "check_state", "kick",
-  // "relate".
+  // "relate"; "preview": nothing has run
   std::string command;
   std::string version;  // of the program that judged
   std::string scene, backend;

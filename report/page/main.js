@@ -23,8 +23,9 @@ const hasGroups = Boolean(data.frames) && data.frames.clusters.some((n) => n > 0
 const state = { at: 0, finding: null, isPlaying: false, spot: null };
 let view = null, edges = null, plots = [], shown = 0, colours = null;
 
-// Frames of somebody else's run have no stages, and a state has no frames.
-const words = (moment) => (data.command === 'check_state' ? 'The state' : moment.start ? 'As loaded' : data.foreign ? `Frame ${moment.frame}` : `Frame ${moment.frame}, after ${moment.stage}`);
+// Frames of somebody else's run have no stages, nor have those of a scene that has not run; a state has no frames.
+const isPreview = data.command === 'preview', hasStages = !data.foreign && !isPreview;
+const words = (moment) => (data.command === 'check_state' ? 'The state' : moment.start ? 'As loaded' : !hasStages ? `Frame ${moment.frame}` : `Frame ${moment.frame}, after ${moment.stage}`);
 
 function header() {
   const name = data.scene || 'a recording';
@@ -32,7 +33,8 @@ function header() {
   byId('title').textContent = name;
   const kind = !data.checked ? 'muted' : data.holds ? 'good' : 'bad';
   byId('summary').append(badge(kind, !data.checked ? 'not judged' : data.holds ? 'holds' : 'fails'), element('span', { text: data.summary }));
-  const facts = [`${plural(data.body.particles, 'particle')}`, `h = ${figure(1e3 * data.body.spacing)} mm`, data.command !== 'check_state' && plural(data.frames.frame.filter((frame) => frame >= 0).length, 'frame')].filter(Boolean);
+  const hasFrames = data.command !== 'check_state' && !isPreview;
+  const facts = [`${plural(data.body.particles, 'particle')}`, `h = ${figure(1e3 * data.body.spacing)} mm`, hasFrames && plural(data.frames.frame.filter((frame) => frame >= 0).length, 'frame')].filter(Boolean);
   if (data.checked) facts.push(plural(data.verdicts, 'verdict'));
   if (data.judgedBy && data.judgedBy !== data.made.program) facts.push(`judged by cutproof ${data.judgedBy}`);
   byId('facts').textContent = facts.join(' · ');
@@ -85,7 +87,7 @@ function controls() {
   const [marks, keys] = timeline();
   return element('div', { class: 'player' },
     element('div', { class: 'track' }, marks, range),
-    element('div', { class: 'row' }, play, button('« Frame', 'Previous frame', frame(-1)), !data.foreign && button('‹ Stage', 'Previous stage', step(-1)), !data.foreign && button('Stage ›', 'Next stage', step(1)), button('Frame »', 'Next frame', frame(1)), keys));
+    element('div', { class: 'row' }, play, button('« Frame', 'Previous frame', frame(-1)), hasStages && button('‹ Stage', 'Previous stage', step(-1)), hasStages && button('Stage ›', 'Next stage', step(1)), button('Frame »', 'Next frame', frame(1)), keys));
 }
 
 function lookControls(hasSkin) {
@@ -301,8 +303,8 @@ async function showFinding(k, scrolls = true) {
 function findings() {
   const section = byId('findings');
   const failing = data.findings.filter((one) => !one.expected);
-  byId('findings-title').textContent = failing.length ? 'What fails' : !data.checked ? 'Nothing was judged' : data.holds ? 'Nothing fails' : 'It does not hold';
-  if (!data.checked) section.append(element('p', { text: 'This page shows what happened. Whether it is right, this command judges:' }));
+  byId('findings-title').textContent = failing.length ? 'What fails' : isPreview ? 'Nothing has run' : !data.checked ? 'Nothing was judged' : data.holds ? 'Nothing fails' : 'It does not hold';
+  if (!data.checked) section.append(element('p', { text: isPreview ? 'This page shows what the scene says. This command runs it and judges what happens:' : 'This page shows what happened. Whether it is right, this command judges:' }));
   if (data.checked && data.holds && !failing.length) {
     const near = data.rows.filter((row) => row.judged > 0 && row.ofBound !== null).sort((a, b) => b.ofBound - a.ofBound)[0];
     section.append(element('p', { text: `All that was judged holds${data.findings.length ? ', but for what the scene expects to fail' : ''}.${near ? ` The nearest to its bound is ${near.property}${data.foreign ? '' : ` after ${near.stage}`}, at ${figure(near.ofBound)} of the bound, in frame ${near.frame}.` : ''}` }));
@@ -322,16 +324,16 @@ function about() {
   say(`Positions on this page are rounded to steps of 16 bits, and so off by at most ${figure(data.loss)} h (h is the spacing of particles). Verdicts were made from the full numbers.`);
   if (data.thinned) say(data.thinned);
   if (data.nowhere > 0) say(`Up to ${plural(data.nowhere, 'particle')} of a moment are not drawn: their positions are no numbers, or far outside the body.`);
-  const stages = data.foreign ? '' : ' A frame is step, detect, split, merge, expand and skin; a stage that had nothing to do is left out.';
-  say(`Frames count from 0.${stages} This page holds ${plural(data.moments.length, 'moment')}. It needs no network. Keys in the 3D view: arrows turn, with Shift they shift; + and − zoom, 0 shows the whole body; space plays, comma and full stop go a ${data.foreign ? 'frame' : 'stage'} back and on; C cuts the body open, [ and ] move the cut and Alt with arrows turns it, as dragging with Alt and with Alt and Shift does.`);
-  if (!comparison && !data.foreign) say('A distance to the reference is shown where one was asked for: cutproof run --against reference --report, or cutproof report with a second recording.');
+  const stages = !hasStages ? '' : ' A frame is step, detect, split, merge, expand and skin; a stage that had nothing to do is left out.';
+  say(`Frames count from 0.${stages} This page holds ${plural(data.moments.length, 'moment')}. It needs no network. Keys in the 3D view: arrows turn, with Shift they shift; + and − zoom, 0 shows the whole body; space plays, comma and full stop go a ${hasStages ? 'stage' : 'frame'} back and on; C cuts the body open, [ and ] move the cut and Alt with arrows turns it, as dragging with Alt and with Alt and Shift does.`);
+  if (!comparison && hasStages) say('A distance to the reference is shown where one was asked for: cutproof run --against reference --report, or cutproof report with a second recording.');
 }
 
 async function main() {
   header();
   findings();
   if (data.rows.length) byId('verdicts').append(table(data, jump)); else byId('verdicts').remove();
-  plots = plotsOf(data, (frame) => jump(frame, 'skin'));
+  plots = isPreview ? [] : plotsOf(data, (frame) => jump(frame, 'skin'));
   if (plots.length) byId('plots').append(element('div', { class: 'grid' }, ...plots.map((one) => one.card))); else byId('plots').remove();
   about();
 

@@ -90,5 +90,76 @@ TEST_F(SceneNames, OfYourOwnNeedABodyThatIsHeldOrAGeometricCut) {
   }
 }
 
+class Preview : public Program {};
+
+TEST_F(Preview, ShowsASceneAndRunsNothing) {
+  if (!CUTPROOF_HAS_PAGES) {
+    expect_refused("run cylinder --preview page.html", {"--preview", "built without report pages"});
+    return;
+  }
+  const Outcome outcome = cutproof("run cylinder --preview page.html");
+  EXPECT_EQ(outcome.status, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("page.html"), std::string::npos) << outcome.output;
+  EXPECT_EQ(outcome.output.find("ms per frame"), std::string::npos) << outcome.output;
+  EXPECT_EQ(listing(), std::set<std::string>{"page.html"});
+  const auto data_of = [&] {
+    const std::string page = read("page.html"), begin = "id=\"data\">";
+    const std::size_t data = page.find(begin) + begin.size();
+    return nlohmann::json::parse(page.substr(data, page.find("</script>", data) - data));
+  };
+  const nlohmann::json shown = data_of(), &moments = shown.at("moments");
+  EXPECT_EQ(shown.at("command"), "preview");
+  EXPECT_TRUE(moments.at(0).at("start").get<bool>());
+  // After the start, frames in which the blade is down.
+  int64_t before = -1;
+  for (std::size_t k = 1; k < moments.size(); ++k) {
+    EXPECT_FALSE(moments[k].at("blade").is_null());
+    EXPECT_GT(moments[k].at("frame").get<int64_t>(), before);
+    before = moments[k].at("frame").get<int64_t>();
+    EXPECT_EQ(moments[k].at("particles"), moments[0].at("particles"));
+  }
+  EXPECT_LT(moments.back().at("blade").at(0).at(2).get<double>(), 0) << "the stroke ends below the body";
+  EXPECT_EQ(cutproof("run cylinder --set blade.speed=0.01 --preview page.html").status, 0);
+  EXPECT_EQ(data_of().at("moments").size(), 61U) << "of a long stroke 60 frames";
+  // What looks wrong of the scene is said here.
+  const Outcome bent = cutproof("run kidney_arc --set blade.length=1.5 --preview page.html");
+  EXPECT_EQ(bent.status, 0) << bent.output;
+  EXPECT_NE(on_one_line(bent.output).find("note: blade.length: the blade is a straight plate"), std::string::npos)
+      << bent.output;
+}
+
+TEST_F(Preview, IsRefusedBesideWhatARunIsFor) {
+  if (!CUTPROOF_HAS_PAGES) GTEST_SKIP() << "this program makes no pages";
+  for (const std::string other : {"--check", "--against reference", "--errors all", "--record r", "--json r.json",
+                                  "--junit r.xml", "--report r.html"}) {
+    expect_refused("run cylinder --preview page.html " + other,
+                   {"--preview", "nothing runs", other.substr(0, other.find(' '))});
+  }
+  expect_refused("run cylinder --preview nowhere/page.html", {"nowhere"});
+  expect_refused("run cylinder --set blade.length=-1 --preview page.html", {"blade.length"});
+}
+
+// What the guide says of a straight plate on a bent path: with the length that the note tells it leaves no crumbs.
+TEST_F(SceneNames, OfABladeThatLeavesItsPathLeaveCrumbsUnlessItIsShortEnough) {
+  write("arc.json", R"({"version": 5, "name": "arc",
+    "body": {"shape": {"kind": "cylinder", "radius": 0.03, "length": 0.08}, "particles": 3000},
+    "frame": {"settle": 0.08}, "step": {"damping": 5},
+    "grips": [{"low": [0, 0, 0], "high": [1, 0.12, 1]}, {"low": [0, 0.88, 0], "high": [1, 1, 1]}],
+    "blade": {"thickness": 0.5, "strokes": [
+      {"curve": "arc", "points": [[-0.2, 0.3, -0.2], [0.5, 0.65, -0.2], [1.2, 0.3, -0.2]]}]}})");
+  const auto pieces = [&](const std::string& more, std::string* note) {
+    const Outcome outcome = cutproof("run arc.json --errors topology --json out.json " + more);
+    EXPECT_EQ(outcome.status, 0) << outcome.output;
+    *note = on_one_line(outcome.output);
+    return nlohmann::json::parse(read("out.json")).at("errors").at("topology").at("components").get<int>();
+  };
+  std::string note;
+  EXPECT_GT(pieces("", &note), 2);
+  const std::size_t told = note.find("--set blade.length=");
+  ASSERT_NE(told, std::string::npos) << note;
+  EXPECT_EQ(pieces(note.substr(told, note.find(')', told) - told), &note), 2);
+  EXPECT_EQ(note.find("beside its path"), std::string::npos) << note;
+}
+
 }  // namespace
 }  // namespace scene_files_test
