@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "cli/commands.h"
+#include "cli/report_page.h"
 #include "harness/backends.h"
 #include "model/at.h"
 #include "model/io/atomic_file.h"
@@ -48,7 +49,7 @@ void write_preview(const std::string& path, const Scene& scene, const fixtures::
   results.command = "preview";
   results.scene = scene.name;
   results.notes = built.notes;
-  io::write_text(path, report::page(source, results, judged_by, kVersion));
+  io::write_text(path, report::page(source, results, judged_by, made_by(judged_by)));
 }
 
 }  // namespace cutproof::cli
