@@ -17,7 +17,7 @@ program=(
   nlohmann-json3-dev libfmt-dev libcli11-dev
   python3 esbuild libjs-three  # report pages
 )
-package=(dpkg-dev file)  # the libraries on which a package depends
+package=(dpkg-dev file libgfortran-12-dev)  # what a package depends on; the archive that libblas.a needs
 tests=(
   "${package[@]}" git ccache
   libgtest-dev libgmock-dev librapidcheck-dev
@@ -25,6 +25,7 @@ tests=(
   libbullet-dev python3-scipy python3-skimage  # judged as examples: docs/results/libraries.md
   groff-base   # reads the manual page
   zsh fish     # read their completions
+  python3-venv # pip, which installs the wheel
   openmpi-bin  # mpirun, for a test of ci/cluster/; no program is linked with it
 )
 browser=(chromium chromium-driver python3-selenium)

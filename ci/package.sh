@@ -1,15 +1,18 @@
 #!/usr/bin/env bash
-# Builds the program and the libraries, and packs them into dist/: a .tar.gz, and a .deb for the system on which
-# it runs, each with its SHA-256.
+# Builds the program and the libraries, and packs them: a .tar.gz and a .deb, each with its SHA-256, and a wheel. Their
+# program needs glibc 2.34 or later, and nothing else.
 # Usage: ci/package.sh [OPTIONS of cmake]     e.g. -DCUTPROOF_CUDA=ON, with the gpu backend
+# CUTPROOF_DIST: where the packages go, and nothing else stays (default: dist)
 set -euo pipefail
 cd "$(dirname "$0")/.."
+dist=${CUTPROOF_DIST:-$PWD/dist}
 
 ci/install.sh package
 cmake --preset package "$@" > /dev/null
 cmake --build build/package
-rm -rf dist
-cpack --config build/package/CPackConfig.cmake -G "TGZ;DEB" -B "$PWD/dist" > build/package/cpack.log 2>&1 ||
+rm -rf "$dist"
+cpack --config build/package/CPackConfig.cmake -G "TGZ;DEB" -B "$dist" > build/package/cpack.log 2>&1 ||
   { cat build/package/cpack.log >&2; exit 3; }
-rm -rf dist/_CPack_Packages
-ls -l dist
+rm -rf "$dist/_CPack_Packages"
+ci/wheel.sh "$dist" > /dev/null
+ls -l "$dist"

@@ -23,6 +23,7 @@ import re
 import shutil
 import socket
 import subprocess
+import sys
 import tempfile
 import threading
 import traceback
@@ -890,3 +891,12 @@ def _describe(guest, document, seed, precision):
             lines.append(f"{name}: given up after {operation['not_answered']} questions that were not answered; "
                          "keep_going=True goes on")
     return "\n".join(lines)
+
+
+if __name__ == "__main__":  # python -m cutproof
+    try:
+        program = _find_program()
+    except Error as error:
+        print(f"cutproof: {error}", file=sys.stderr)
+        sys.exit(3)
+    os.execv(program, [program, *sys.argv[1:]])
