@@ -119,8 +119,8 @@ TEST_F(Verbs, ReportMakesAPageOfEveryDocumentAndRefusesWhatDoesNotGoTogether) {
     EXPECT_EQ(made.status, 0) << made.output;
     EXPECT_NE(made.output.find("everything on the page holds"), std::string::npos) << made.output;
     // When it was made, and by which command, differs.
-    const auto without_head = [&](const std::string& name) {
-      std::string page = read(name);
+    const auto without_head = [&](const std::string& which) {
+      std::string page = read(which);
       const std::size_t first = page.find("\"made\":{");
       return page.erase(first, page.find('}', first) - first);
     };
