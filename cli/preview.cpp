@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "cli/commands.h"
+#include "cli/options.h"
 #include "cli/report_page.h"
 #include "harness/backends.h"
 #include "model/at.h"
@@ -37,7 +38,7 @@ State with_skin(const fixtures::Built& built) {
 }  // namespace
 
 void write_preview(const std::string& path, const Scene& scene, const fixtures::Built& built,
-                   const std::string& judged_by) {
+                   const std::string& again) {
   const State state = with_skin(built);
   const std::vector<int64_t> frames = frames_of_the_blade(built.setup);
   const report::Source source = {built.setup, 1 + std::ssize(frames), [&](int64_t index) {
@@ -49,7 +50,7 @@ void write_preview(const std::string& path, const Scene& scene, const fixtures::
   results.command = "preview";
   results.scene = scene.name;
   results.notes = built.notes;
-  io::write_text(path, report::page(source, results, judged_by, made_by(judged_by)));
+  io::write_text(path, report::page(source, results, again + " --check", made_by(again + " --preview " + quoted(path))));
 }
 
 }  // namespace cutproof::cli

@@ -7,9 +7,7 @@
 
 namespace cutproof::cli {
 
-// The body as it begins, with its skin, and the way of the blade. `judged_by`: the command line that runs and judges
-// it.
-void write_preview(const std::string& path, const Scene& scene, const fixtures::Built& built,
-                   const std::string& judged_by);
+// The body as it begins, with its skin, and the way of the blade. `again`: the command line that runs it.
+void write_preview(const std::string& path, const Scene& scene, const fixtures::Built& built, const std::string& again);
 
 }  // namespace cutproof::cli

@@ -298,7 +298,7 @@ int preview(const RunOptions& options) {
     return fixtures::build(scene, options.scene.file, build_options_of(options));
   });
   print_header(scene, built, options);
-  write_preview(options.preview, scene, built, options.again + " --check");
+  write_preview(options.preview, scene, built, options.again);
   print_written(options.preview);
   return 0;
 }
