@@ -91,7 +91,7 @@ void Progress::clear_all() {
 void Progress::draw(const std::string& line) {
   clear_all();
   // One column less: in the last one some terminals begin a new line.
-  const std::string cut = io::cut_to(line, std::max<std::size_t>(terminal_columns(), 2) - 1);
+  const std::string cut = io::cut_to_words(line, std::max<std::size_t>(terminal_columns(), 2) - 1);
   std::fflush(stdout);
   std::fwrite(cut.data(), 1, cut.size(), stderr);
   std::fflush(stderr);

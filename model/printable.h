@@ -7,6 +7,8 @@
 #include <string>
 #include <string_view>
 
+#include "model/counted.h"
+
 namespace cutproof {
 
 struct Character {
@@ -112,7 +114,7 @@ inline std::string shortened(std::string_view text, std::size_t most) {
   if (text.size() <= most) return std::string(text);
   std::size_t end = most;
   while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;  // between characters
-  return std::string(text.substr(0, end)) + " ... (" + std::to_string(text.size() - end) + " more bytes)";
+  return std::string(text.substr(0, end)) + " ... (" + counted(text.size() - end, "more byte", "more bytes") + ")";
 }
 
 }  // namespace cutproof

@@ -28,7 +28,11 @@ void check_isolation(Judged& judged, Verdict& verdict) {
       break;
     }
   }
-  fail(verdict, {group, {edge.a, edge.b}, {edge.a, edge.b}},
+  const Concerned concerned = {group, {edge.a, edge.b}, {edge.a, edge.b}};
+  if (group.empty())
+    return fail(verdict, concerned, "particle {} lies in no cluster, though it is a neighbour of particle {}", edge.a,
+                edge.b);
+  fail(verdict, concerned,
        "{} of {} clusters {} a group of {} that shares no particle with any other cluster, though particle "
        "{} of it is a neighbour of particle {}",
        group.size(), judged.clusters.count(), group.size() == 1 ? "is" : "form",

@@ -90,6 +90,17 @@ std::string cut_to(const std::string& text, std::size_t columns) {
   return text.substr(0, at);
 }
 
+std::string cut_to_words(const std::string& text, std::size_t columns) {
+  const std::size_t end = cut_to(text, columns).size();
+  if (end == text.size()) return text;
+  // What separates may itself be beyond the end.
+  for (const char* const separator : {", ", " "}) {
+    const std::size_t at = text.rfind(separator, end);
+    if (at != std::string::npos) return text.substr(0, at);
+  }
+  return "";
+}
+
 std::vector<std::string> wrapped(const std::string& line, std::size_t columns, std::size_t hang) {
   if (width_of(line) <= columns) return {line};
   std::vector<std::string> lines;

@@ -15,6 +15,8 @@ inline constexpr std::size_t kColumns = 80;
 std::size_t width_of(const std::string& text);
 // The longest beginning of `text` that is at most `columns` wide.
 std::string cut_to(const std::string& text, std::size_t columns);
+// The same that ends where a word does: before a comma, if there is one, else before a space.
+std::string cut_to_words(const std::string& text, std::size_t columns);
 // Lines at most `columns` wide, broken at spaces. Those after the first begin with `hang` spaces. A word that is too
 // long has a line of its own; unless it holds a slash, as a path does, which is to be copied whole, it is cut to
 // pieces.

@@ -34,6 +34,16 @@ TEST(Columns, CutATextWithoutCuttingACharacter) {
   EXPECT_EQ(cut_to("\x1b[31mab\x1b[0m", 1), "\x1b[31ma");
 }
 
+TEST(Columns, CutALineWhereAWordEnds) {
+  const std::string line = "frame 3 of 20, about 2 min left: 36 clusters";
+  EXPECT_EQ(cut_to_words(line, 44), line);
+  EXPECT_EQ(cut_to_words(line, 43), "frame 3 of 20") << "a figure is not parted from its unit";
+  EXPECT_EQ(cut_to_words(line, 14), "frame 3 of 20");
+  EXPECT_EQ(cut_to_words(line, 13), "frame 3 of 20") << "a comma is no part of a word";
+  EXPECT_EQ(cut_to_words(line, 12), "frame 3 of");
+  EXPECT_EQ(cut_to_words(line, 4), "");
+}
+
 TEST(Columns, GroupDigits) {
   EXPECT_EQ(grouped(999), "999");
   EXPECT_EQ(grouped(16204), "16,204");

@@ -79,6 +79,11 @@ def progress(program, folder):
         expect(len(drawn) > 5, f"{columns} columns: {len(drawn)} lines of progress: {seen!r}")
         widest = max(map(len, drawn), default=0)
         expect(widest < columns, f"{columns} columns: a line of progress takes {widest}")
+        parts = (r"case \d+( of \d+)?", r", elapsed \d+ (s|min)", r"(, about \d+ (s|min) left|, nearly done)?: \d+ violations",
+                 r", \d+ cases/s", r", \d+ of \d+ classes met")
+        for line in drawn:
+            expect(any(re.fullmatch("".join(parts[:k + 1]), line) for k in range(len(parts))) or columns == 12 and
+                   re.fullmatch(r"case( \d+)?( of)?", line), f"{columns} columns: a line ends inside of a word: {line!r}")
         if columns == 80:
             expect(any(re.search(r"elapsed [0-9]+ s, about [0-9]+ s left", line) for line in drawn),
                    f"no time that is left: {drawn[-3:]}")

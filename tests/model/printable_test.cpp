@@ -50,6 +50,7 @@ TEST(Printable, IsPrintableOnceAndForAll) {
 TEST(Shortened, CutsBetweenCharactersAndSaysHowMuchIsLeftOut) {
   EXPECT_EQ(shortened("abc", 3), "abc");
   EXPECT_EQ(shortened("abcdef", 3), "abc ... (3 more bytes)");
+  EXPECT_EQ(shortened("abcd", 3), "abc ... (1 more byte)");
   EXPECT_EQ(shortened("abé", 3), "ab ... (2 more bytes)");
 }
 

@@ -33,5 +33,12 @@ TEST(Isolation, IsNotHiddenByAClusterThatCouplesAcrossAGap) {
             std::string::npos);
 }
 
+TEST(Isolation, SaysOfAParticleWithoutAClusterThatItHasNone) {
+  Row row(4, {{0, 1, 2}});
+  const Verdict verdict = isolation(row.setup, row.state);
+  expect_rejected(verdict, {}, {3, 2});
+  EXPECT_EQ(verdict.witness.text, "particle 3 lies in no cluster, though it is a neighbour of particle 2");
+}
+
 }  // namespace
 }  // namespace cutproof::oracles::isolation_test
