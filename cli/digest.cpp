@@ -35,8 +35,7 @@ int print_digests(const std::string& recording) {
 
 void add_digest(CLI::App& program, Work& work) {
   const auto recording = std::make_shared<std::string>();
-  CLI::App* const command =
-      program.add_subcommand("digest", "a number for each snapshot of a recording: equal where every bit is");
+  CLI::App* const command = program.add_subcommand("digest", "a number for each snapshot, equal where every bit is");
   command->add_option("recording", *recording, "what `run --record` has written")->required()->type_name("F");
   command->callback([recording, &work] { work = [recording] { return print_digests(*recording); }; });
 }

@@ -1,7 +1,10 @@
 #include "cli/help.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
+#include "cli/usage.h"
 #include "model/io/columns.h"
 
 namespace cutproof::cli {
@@ -16,9 +19,29 @@ std::size_t begin_of_explanation(const std::string& line) {
   return gap == std::string::npos ? name : std::min(line.find_first_not_of(' ', gap), line.size());
 }
 
+// A terminal of 24 lines shows all of it. Tests and shells read what stands behind "Subcommands:".
+std::string overview(const CLI::App& program) {
+  std::string subcommands;
+  bool has_pages = false;
+  for (const CLI::App* const verb : shown_commands(program)) {
+    subcommands += fmt::format("  {:<15}{}\n", verb->get_name(), verb->get_description());
+    has_pages = has_pages || verb->get_name() == "report";
+  }
+  const auto example = [&](const std::string& command, const std::string& page, const char* what) {
+    return fmt::format("  {:<52} {}\n", command + (has_pages ? " --report " + page : ""), what);
+  };
+  return "cutproof judges soft-body dissection, frame by frame. Try\n" +
+         example("cutproof run three_cuts --check", "cuts.html", "a scene") +
+         example("cutproof check run.h5", "run.html", "a run of your simulator") +
+         example("cutproof judge ./libmine.so", "mine.html", "your own kernels") + "\nSubcommands:\n" + subcommands +
+         "\nOptions: --help, --version; of each subcommand also --color, --quiet, --verbose\n"
+         "Exit status: 0 holds, 1 fails, 2 bad input, 3 the machine failed\n";
+}
+
 }  // namespace
 
 std::string help_page(const CLI::App& program) {
+  if (program.get_subcommands().empty()) return overview(program);
   const std::string page = program.help();
   std::string fitted;
   for (std::size_t begin = 0; begin < page.size();) {

@@ -1,4 +1,4 @@
-// `cutproof info`: version, backends, devices, properties; a mesh, examined.
+// `cutproof info`: backends, devices, properties, version; a mesh, examined.
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -145,7 +145,7 @@ int info(const InfoOptions& options, const CLI::App& program) {
     insist_as_it_is(manual_page(program, date_of_build()));
     return 0;
   }
-  insist("cutproof {}\nbackends:\n", kVersion);
+  insist("backends:\n");
   for (const harness::BackendDescriptor& backend : harness::backends()) {
     insist("{}\n", io::hanging(fmt::format("  {:<11} {}", backend.name, harness::description_of(backend)), 14));
   }
@@ -154,8 +154,9 @@ int info(const InfoOptions& options, const CLI::App& program) {
   insist(
       "scene files: version {} (`cutproof info --scene` lists every field)\n"
       "recordings: temporal VTKHDF 2.0, format {}\n"
-      "licence: sources MIT; this program links CGAL and SuiteSparse, which makes it GPL\n",
-      kSceneVersion, io::kFormatVersion);
+      "licence: sources MIT; this program links CGAL and SuiteSparse, which makes it GPL\n"
+      "cutproof {}\n",
+      kSceneVersion, io::kFormatVersion, kVersion);
   return 0;
 }
 
@@ -163,7 +164,7 @@ int info(const InfoOptions& options, const CLI::App& program) {
 
 void add_info(CLI::App& program, Work& work) {
   const auto options = std::make_shared<InfoOptions>();
-  CLI::App* const command = program.add_subcommand("info", "version, backends, devices, properties; or a mesh");
+  CLI::App* const command = program.add_subcommand("info", "backends, devices, properties, version; or a mesh");
   command->add_flag("--scene", options->scene, "list every field of a scene file");
   command->add_flag("--schema", options->schema, "print the JSON Schema of scene files, for editors");
   command->add_flag("--scenes", options->scenes, "list the scenes that come with the program");

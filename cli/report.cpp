@@ -242,7 +242,8 @@ int make_report(const ReportOptions& options) {
 void add_report(CLI::App& program, Work& work) {
   const auto options = std::make_shared<ReportOptions>();
   CLI::App* const command =
-      program.add_subcommand("report", "make a page for a browser from a recording, or from what --json has written");
+      program.add_subcommand("report", "make a page of a recording, or of what --json has written");
+  if (!report::has_pages()) command->group("");
   command
       ->add_option(
           "files", options->files,

@@ -1,5 +1,5 @@
-// Takes the place of bench and tune in a program that is built without them (-DCUTPROOF_BENCHMARKS=OFF): both verbs are
-// there, and say so.
+// Takes the place of bench and tune in a program that is built without them (-DCUTPROOF_BENCHMARKS=OFF): both verbs say
+// so, and help does not list them.
 #include <CLI/CLI.hpp>
 #include <string>
 
@@ -13,7 +13,7 @@ namespace {
 void add_refused(CLI::App& program, Work& work, const std::string& verb) {
   CLI::App* const command =
       program.add_subcommand(verb, verb + " is not in this build: configure with -DCUTPROOF_BENCHMARKS=ON");
-  command->allow_extras();
+  command->group("")->allow_extras();
   command->callback([verb, &work] {
     work = [verb]() -> int {
       throw InputError("cutproof " + verb, "", "This program was built without it.",

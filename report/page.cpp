@@ -131,8 +131,10 @@ json data_json(const Source& source, const Results& results, const Pictures& pic
 
 }  // namespace
 
+bool has_pages() { return !kPageScript.empty(); }
+
 void require_pages(const std::string& option) {
-  if (!kPageScript.empty()) return;
+  if (has_pages()) return;
   throw InputError("cutproof", option, "this program was built without report pages",
                    "install the packages esbuild and libjs-three (ci/install.sh does), configure and build again; "
                    "--json has the same verdicts");

@@ -10,7 +10,9 @@
 
 namespace cutproof::report {
 
-// Throws InputError, naming `option`, in a build without esbuild or three.js, of which pages are made.
+// Whether this build makes pages: it had esbuild and three.js, of which they are made.
+bool has_pages();
+// Throws InputError, naming `option`, in a build without them.
 void require_pages(const std::string& option);
 
 // About as much of a page is particles and skin at most.

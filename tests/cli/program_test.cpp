@@ -656,10 +656,17 @@ TEST_F(Program, PrintsNothingButPlainLinesWhenPiped) {
 
 TEST_F(Program, TellsItsVersionBackendsAndSceneFields) {
   EXPECT_EQ(cutproof("--version").output, std::string("cutproof ") + CUTPROOF_VERSION + "\n");
-  EXPECT_NE(cutproof("info").output.find("reference"), std::string::npos);
+  const std::string told = cutproof("info").output;
+  EXPECT_NE(told.find("reference"), std::string::npos);
+  EXPECT_TRUE(told.ends_with("\n" + cutproof("--version").output)) << told;
   const Outcome scene_fields = cutproof("info --scene");
   EXPECT_EQ(scene_fields.status, 0);
   EXPECT_NE(scene_fields.output.find("blade"), std::string::npos);
+  const std::string overview = cutproof("--help").output;
+  EXPECT_LE(std::count(overview.begin(), overview.end(), '\n'), 24) << overview;
+  for (const char* const example : {"cutproof run three_cuts --check", "cutproof check run.h5", "cutproof judge "})
+    EXPECT_NE(overview.find(std::string("\n  ") + example), std::string::npos) << overview;
+  EXPECT_EQ(overview.find("\n  report ") != std::string::npos, CUTPROOF_HAS_PAGES != 0) << "a verb that it lacks";
   for (const std::string command : {"--help", "run --help", "check --help", "info --help"}) {
     EXPECT_EQ(cutproof(command).status, 0) << command;
   }
