@@ -1,4 +1,5 @@
-// Failures as annotations of a GitHub workflow: lines that GitHub shows beside the change that is tested.
+// What a GitHub workflow shows of what was judged: annotations, which are lines beside the change that is tested, and
+// the summary of a step, which is a page in Markdown.
 #pragma once
 #include <string>
 #include <vector>
@@ -20,5 +21,19 @@ std::string warning(const std::string& title, const std::string& text);
 // ten of a step: beyond these the tenth line says how many more there are. `left`: stages that were left to the
 // reference, if there are any, are one warning.
 void print_annotations(const std::vector<Failure>& failures, const std::vector<std::string>& left = {});
+
+struct ForGitHub {
+  std::string command;  // that was given
+  std::vector<Failure> failures = {};
+  std::vector<std::string> left = {};   // stages that were left to the reference
+  std::vector<std::string> known = {};  // properties that fail as they did in the baseline
+  std::vector<std::string> notes = {};  // sentences beside that
+};
+
+// The section of one command.
+std::string step_summary(const ForGitHub& said);
+// Prints annotations, with one warning for all that is known, and appends the section to the file that the environment
+// variable GITHUB_STEP_SUMMARY names, if there is one. Throws MachineError if that cannot be written.
+void tell_github(const ForGitHub& said);
 
 }  // namespace cutproof::cli

@@ -4,6 +4,7 @@
 #include <memory>
 #include <utility>
 
+#include "cli/baseline.h"
 #include "cli/check_run.h"
 #include "cli/check_state.h"
 #include "cli/commands.h"
@@ -30,7 +31,7 @@ namespace {
 struct CheckOptions {
   std::string recording;
   std::string depth{name_of(harness::Depth::motion)};
-  std::string json, junit, report;
+  std::string json, junit, report, baseline;
   bool as_run = false;
   std::string again;  // the command line
 };
@@ -45,6 +46,8 @@ int check_recording(const CheckOptions& options) {
   require_writable(options.json);
   require_writable(options.junit);
   require_report(options.report);
+  const std::optional<Baseline> baseline =
+      read_baseline(options.baseline, {"cutproof.check", "cutproof.run"}, scene.name);
 
   const auto initial = std::make_shared<const State>(reader.snapshot(0).state);
   say("recording {}: scene {}, backend {}, {} snapshots of {} particles\n", options.recording,
@@ -69,21 +72,31 @@ int check_recording(const CheckOptions& options) {
   }
   judge.finish();
   // The file first: it is kept even if standard output cannot be written.
-  const nlohmann::json document = to_json(result, &judge);
+  nlohmann::json document = to_json(result, &judge);
+  const std::optional<SinceBaseline> since = since_baseline(baseline, document);
   write_document(options.json, document);
   if (!options.report.empty()) write_report(options.report, reader, document, made_by(options.again));
-  const Judging judging{"cutproof check", "cutproof.check." + (scene.name.empty() ? "recording" : scene.name),
+  const Judging judging{"cutproof check", class_of("check", scene.name.empty() ? "recording" : scene.name),
                         options.again};
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
-  write_junit(options.junit, judging, seconds.count(), cases_of(judge, judging));
+  std::vector<io::JunitCase> cases = cases_of(judge, judging);
+  if (since) excuse_known(*since, cases);
+  write_junit(options.junit, judging, seconds.count(), std::move(cases));
   print_verdicts(judge, options.again);
   print_written(options.json);
   print_written(options.report);
   print_conclusion(judge);
-  print_annotations(failures_of(judge.verdicts(), judging,
-                                [&](const Verdict& verdict) { return judge.is_expected_failure(verdict); }),
-                    judge.left_to_reference());
-  return judge.holds() ? 0 : 1;
+  if (since) print_since(*since);
+  ForGitHub said = {options.again,
+                    failures_of(judge.verdicts(), judging,
+                                [&](const Verdict& verdict) {
+                                  return judge.is_expected_failure(verdict) ||
+                                         (since && since->is_known(verdict, true));
+                                }),
+                    judge.left_to_reference()};
+  if (since) add_baseline_to(said, *since);
+  tell_github(said);
+  return judge.holds() || (since && since->fresh.empty()) ? 0 : 1;
 }
 
 int check(const CheckOptions& options) {
@@ -91,7 +104,7 @@ int check(const CheckOptions& options) {
   const bool is_recording = !has_segments && !io::is_array_file(options.recording);
   if (is_recording && !options.as_run) return check_recording(options);
   depth_asked(options.depth);  // there is no motion to leave out, but a depth that is none is refused all the same
-  const StateReports reports = {options.json, options.junit, options.report, options.again};
+  const StateReports reports = {options.json, options.junit, options.report, options.again, options.baseline};
   if (is_recording) {
     open_recording(options.recording);  // one that contradicts itself is refused here, too
     return check_run(io::RunSegments::of_recording(options.recording), options.recording, reports);
@@ -122,6 +135,7 @@ void add_check(CLI::App& program, Work& work) {
   add_json(*command, options->json, "write verdicts and counts");
   add_junit(*command, options->junit);
   add_report_option(*command, options->report);
+  add_baseline(*command, options->baseline);
   command->callback([options, command, &work] {
     options->again = as_given(*command);
     work = [options] { return check(*options); };

@@ -64,7 +64,7 @@ nlohmann::json to_json(const std::string& file, const harness::JudgedRun& judged
             {"in_words", in_words(pieces)}}},
           {"arrays", judged.given},
           {"single_precision", judged.single_precision},
-          {"verdicts", io::verdicts_json(judged.verdicts)},
+          {"verdicts", io::verdicts_json(judged.verdicts, false)},
           {"not_judged", not_judged_json(judged.not_judged)},
           {"summary", {{"holds", judged.holds()}, {"verdicts", judged.verdicts.size()}, {"failed", failed}}},
           {"notes", judged.notes}};
@@ -97,6 +97,7 @@ int check_run(io::RunSegments segments, const std::string& file, const StateRepo
   require_writable(reports.json);
   require_writable(reports.junit);
   require_report(reports.page);
+  const std::optional<Baseline> baseline = read_baseline(reports.baseline, {"cutproof.check_run"});
   harness::PiecesOverTime pieces;
   const harness::JudgedRun judged = [&] {
     Progress progress("frame", 0);
@@ -105,15 +106,16 @@ int check_run(io::RunSegments segments, const std::string& file, const StateRepo
       progress.show(frame + 1, "judging");
     });
   }();
-  const nlohmann::json document = to_json(file, judged);
+  nlohmann::json document = to_json(file, judged);
+  const std::optional<SinceBaseline> since = since_baseline(baseline, document);
   write_document(reports.json, document);
   if (!reports.page.empty()) write_page_of(file, judged, pieces, document, reports);
-  const Judging judging{"cutproof check", "cutproof.check.run", reports.again, Judging::Of::frames};
+  const Judging judging{"cutproof check", class_of("check", "run"), reports.again, Judging::Of::frames};
   say("run {}: {} frames of {} particles; {}\n", file, judged.frames, judged.particles_at_end, in_words(judged.pieces));
   Shown shown{reports.again};
   shown.in_stages = false;
-  show_judged(judged.verdicts, judged.not_judged, judged.notes, shown, judging, reports);
-  return judged.holds() ? 0 : 1;
+  show_judged(judged.verdicts, judged.not_judged, judged.notes, shown, judging, reports, {}, since ? &*since : nullptr);
+  return judged.holds() || (since && since->fresh.empty()) ? 0 : 1;
 }
 
 }  // namespace cutproof::cli

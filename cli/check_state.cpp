@@ -45,7 +45,7 @@ nlohmann::json to_json(const std::string& file, const harness::ForeignState& for
           {"promises", promises},
           {"promises_given", foreign.promises_given},
           {"single_precision", foreign.state.precision == Precision::binary32},
-          {"verdicts", io::verdicts_json(judged.verdicts)},
+          {"verdicts", io::verdicts_json(judged.verdicts, false)},
           {"not_judged", not_judged_json(judged.not_judged)},
           {"summary", {{"holds", judged.holds()}, {"verdicts", judged.verdicts.size()}, {"failed", failed}}},
           {"notes", judged.notes}};
@@ -82,13 +82,15 @@ nlohmann::json not_judged_json(const std::vector<harness::NotJudged>& not_judged
 
 void show_judged(const std::vector<Verdict>& verdicts, const std::vector<harness::NotJudged>& not_judged,
                  const std::vector<std::string>& notes, const Shown& shown, const Judging& judging,
-                 const StateReports& reports, const std::vector<std::pair<std::string, std::string>>& properties) {
+                 const StateReports& reports, const std::vector<std::pair<std::string, std::string>>& properties,
+                 const SinceBaseline* since) {
   std::vector<io::JunitCase> cases = cases_of(verdicts, judging);
   std::vector<std::pair<std::string, std::string>> others;
   for (const harness::NotJudged& each : not_judged) {
     others.emplace_back(each.property, each.why);
     cases.push_back({each.property, judging.class_name, 0, io::JunitOutcome::skipped, "not judged: " + each.why});
   }
+  if (since != nullptr) excuse_known(*since, cases);
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - reports.begun;
   write_junit(reports.junit, judging, seconds.count(), std::move(cases), properties);
   print_verdicts(verdicts, shown);
@@ -97,7 +99,12 @@ void show_judged(const std::vector<Verdict>& verdicts, const std::vector<harness
   print_written(reports.json);
   print_written(reports.page);
   print_conclusion(verdicts, shown, "what was judged holds.");
-  print_annotations(failures_of(verdicts, judging));
+  if (since != nullptr) print_since(*since);
+  ForGitHub said = {judging.again, failures_of(verdicts, judging, [&](const Verdict& verdict) {
+                      return since != nullptr && since->is_known(verdict, judging.in_stages());
+                    })};
+  if (since != nullptr) add_baseline_to(said, *since);
+  tell_github(said);
 }
 
 int check_state(const io::ArrayFile& contents, const std::string& file, const StateReports& reports) {
@@ -105,17 +112,19 @@ int check_state(const io::ArrayFile& contents, const std::string& file, const St
   require_writable(reports.json);
   require_writable(reports.junit);
   require_report(reports.page);
+  const std::optional<Baseline> baseline = read_baseline(reports.baseline, {"cutproof.check_state"});
   const harness::ForeignVerdicts judged = harness::judge_foreign_state(foreign);
-  const nlohmann::json document = to_json(file, foreign, judged);
+  nlohmann::json document = to_json(file, foreign, judged);
+  const std::optional<SinceBaseline> since = since_baseline(baseline, document);
   write_document(reports.json, document);
   if (!reports.page.empty()) write_page_of(foreign, judged, document, reports);
-  const Judging judging{"cutproof check", "cutproof.check.state", reports.again, Judging::Of::state};
+  const Judging judging{"cutproof check", class_of("check", "state"), reports.again, Judging::Of::state};
   say("state {}: {} particles in {} clusters, {}{}\n", file, foreign.state.x.size(), foreign.state.clusters.count(),
       foreign.given.contains("nodes") ? "on a grid" : "as a graph", judged.pieces ? "; " + judged.pieces_in_words : "");
   Shown shown{reports.again};
   shown.in_frames = false;
-  show_judged(judged.verdicts, judged.not_judged, judged.notes, shown, judging, reports);
-  return judged.holds() ? 0 : 1;
+  show_judged(judged.verdicts, judged.not_judged, judged.notes, shown, judging, reports, {}, since ? &*since : nullptr);
+  return judged.holds() || (since && since->fresh.empty()) ? 0 : 1;
 }
 
 }  // namespace cutproof::cli

@@ -4,6 +4,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -13,18 +14,27 @@
 
 namespace cutproof::cli {
 
+// "PROPERTY after STAGE", or the property alone where there is no stage or it is not of one.
+std::string case_name(const std::string& property, std::string_view stage);
+// "cutproof.VERB.SUBJECT". Readers part such a name at its dots, so those of a path are written as '_'.
+std::string class_of(const std::string& verb, std::string subject = "");
+
 // Who judged what, and how to see it again.
 struct Judging {
   std::string suite;       // such as "cutproof run"
-  std::string class_name;  // of its cases: the suite, and what was judged
+  std::string class_name;  // of its cases: class_of()
   std::string again;       // a command line
   // What verdicts are of: frames that have stages, frames of somebody else's run, or one state.
   enum class Of : uint8_t { stages, frames, state } of = Of::stages;
+  bool in_stages() const { return of == Of::stages; }
 };
 
+// The case and the annotation of what is no property: that enough was judged, and all of it.
+inline constexpr const char* kEnoughJudged = "enough was judged";
+
 // A case for each property and stage, or each property where there are no stages, in the order in which they first
-// appear: failed with its first failing verdict, skipped where no verdict of it looked at anything. `is_expected`: a
-// failure that the scene asks for, which passes.
+// appear, with the time that its verdicts took: failed with its first failing verdict, skipped where no verdict of it
+// looked at anything. `is_expected`: a failure that the scene asks for, which passes.
 std::vector<io::JunitCase> cases_of(const std::vector<Verdict>& verdicts, const Judging& judging,
                                     const std::function<bool(const Verdict&)>& is_expected = {});
 // The same of all that was judged of a run. Skipped are what was not promised, with how often it would not hold, and
@@ -37,6 +47,7 @@ std::vector<io::JunitCase> cases_of_left(const std::vector<std::string>& stages,
 std::vector<io::JunitCase> cases_of_campaign(const nlohmann::json& document, const std::string& failure,
                                              const Judging& judging);
 
+// One for each property, with what its first failing verdict has found, and how many more there are.
 std::vector<Failure> failures_of(const std::vector<Verdict>& verdicts, const Judging& judging,
                                  const std::function<bool(const Verdict&)>& is_expected = {});
 std::vector<Failure> failures_of_campaign(const nlohmann::json& document, const std::string& failure,

@@ -29,6 +29,7 @@
 #include "model/io/columns.h"
 #include "model/io/filled.h"
 #include "model/io/recording.h"
+#include "model/io/verdict_json.h"
 #include "model/left_stages.h"
 #include "model/printable.h"
 #include "property_tests/campaign.h"
@@ -106,6 +107,10 @@ void print_coverage(const json& document) {
     }
   }
   if (style().verbose) say_as_it_is(table.text());
+  // A campaign that ends before its last case says nothing of what its cases lack.
+  const bool ends_early =
+      !document.at("complete") || (!document.at("violations").empty() && !document.at("keep_going").get<bool>());
+  if (ends_early) return;
   if (empty.empty()) {
     say("all {} coverage classes were met, the rarest in {} cases: {}\n", classes, least, rarest);
   } else {
@@ -124,7 +129,7 @@ void print_properties(const json& properties) {
     const bool has_share = each.at("of_bound").is_number();
     table.add({printable(io::filled("{property}", each)), printable(io::filled("{stage}", each)),
                io::filled("{judged}", each), io::filled("{failed}", each),
-               has_share ? io::filled("{of_bound:.2g}", each) : "-",
+               has_share ? io::share_of(each.at("of_bound").get<double>()) : "-",
                each.at("undecided") > 0 ? io::filled("{undecided} of {checked}", each) : "-"});
     if (each.at("failed") > 0) {
       failed.push_back(printable(io::filled("{property} after {stage} ({failed} of {judged} verdicts)", each)));
@@ -141,7 +146,8 @@ void print_properties(const json& properties) {
     say("{} pairs of a property and a stage {}, in {} verdicts", holds, holding(holds == 1 ? "holds" : "hold"),
         io::grouped(judged));
     if (nearest != nullptr) {
-      say_filled("; the nearest to its bound: {property} after {stage}, at {of_bound:.2g} of it", *nearest);
+      say_filled("; the nearest to its bound: {property} after {stage}", *nearest);
+      say(", at {} of it", io::share_of(nearest->at("of_bound").get<double>()));
     }
     say("\n");
   }
@@ -188,7 +194,7 @@ int print_conclusion(const json& document, const CampaignConclusion& conclusion)
 // What a campaign came to goes into files first: these are kept even if standard output cannot be written.
 int conclude_campaign(const FuzzOptions& options, const json& document, bool whole) {
   const CampaignConclusion conclusion = conclude(document, whole);
-  const Judging judging{"cutproof fuzz", "cutproof.fuzz." + document.at("backend").get<std::string>(), options.again};
+  const Judging judging{"cutproof fuzz", class_of("fuzz", document.at("backend").get<std::string>()), options.again};
   write_document(options.json, document);
   const bool is_plugin = options.backend.name.starts_with(guests::kPluginPrefix);
   write_document_report(options.report, document, made_by(options.again, options.backend.name),
@@ -197,7 +203,8 @@ int conclude_campaign(const FuzzOptions& options, const json& document, bool who
               cases_of_campaign(document, conclusion.failure, judging));
   const int status = print_conclusion(document, conclusion);
   print_written(options.report);
-  print_annotations(failures_of_campaign(document, conclusion.failure, judging), document.at("left_to_reference"));
+  tell_github(
+      {options.again, failures_of_campaign(document, conclusion.failure, judging), document.at("left_to_reference")});
   return status;
 }
 
@@ -244,12 +251,13 @@ json keep(const Violation& violation, const FuzzOptions& options, const Campaign
            asked.seed + static_cast<uint64_t>(violation.index), size_at(asked, violation.index),
            size_at(asked, violation.index), asked.dynamics ? " --dynamics" : "");
   } else if (simplified.alone) {
-    insist("simplified to {} and {}{}: {}\n", counted(found.failing.strokes.size(), "stroke", "strokes"),
+    const std::string now = describe(simplified.verdict);
+    insist("simplified to {} and {}{}{}\n", counted(found.failing.strokes.size(), "stroke", "strokes"),
            counted(found.failing.nodes.size(), "particle", "particles"),
            harness::described_backend(choice.name).takes_schedule
                ? ", " + counted(gpu::preemptions(found.schedule), "preemption", "preemptions")
                : "",
-           describe(simplified.verdict));
+           now == describe(violation.verdict) ? "" : ": " + now);
     const std::string problem = record_case(stem, backend_of(found, choice), found.failing);
     if (problem.empty()) {
       say_copy("recorded", io::recording_paths(stem).index);

@@ -216,8 +216,9 @@ std::string keep(const JudgeOptions& options, Guest& guest, const KernelCampaign
   insist("{}: {}, '{}', {}:\n  {}\n", failing("FAILS"), saved.operation, failure.verdict.property,
          name_of_question(failure.index, failure.size, failure.simplest.kind),
          shortened(failure.verdict.witness.text, kMostWitnessBytes));
-  insist("  simplified to {}: {}\n", campaign.operation->size_of(failure.simplest),
-         shortened(failure.of_simplest.witness.text, kMostWitnessBytes));
+  const std::string& now = failure.of_simplest.witness.text;
+  insist("  simplified to {}{}\n", campaign.operation->size_of(failure.simplest),
+         now == failure.verdict.witness.text ? "" : ": " + shortened(now, kMostWitnessBytes));
   insist_copy("  saved; to see it again:", replay_command(options, file, saved.operation));
   if (campaign.operation->files != nullptr) keep_run(file, guest, *campaign.operation, failure);
   return file;
@@ -242,10 +243,11 @@ void add_cases(const json& result, const JudgeOptions& options, std::vector<io::
       const std::string again = failure.at("again");
       each.outcome = io::JunitOutcome::failed;
       each.message = failure.at("text");
+      const std::string now = failure.at("simplified");
       each.text = fmt::format(
-          "{}: {}\nsimplified: {}\nto see it again: {}",
+          "{}: {}\n{}to see it again: {}",
           name_of_question(failure.at("index"), failure.value("drawn_size", int64_t{0}), failure.at("kind")),
-          each.message, failure.at("simplified").get<std::string>(), again);
+          each.message, now == each.message ? "" : "simplified: " + now + "\n", again);
       failures.push_back({operation + ": " + each.name, each.message, again});
     }
   }
@@ -423,7 +425,7 @@ int judge(JudgeOptions options) {
     const std::string how_far =
         fmt::format("it was stopped after {} of {} begun", begun, counted(all, "operation was", "operations were"));
     insist("{}: {}\n", undecided("INCOMPLETE"), how_far);
-    io::JunitCase& stopped = junit.emplace_back(io::JunitCase{"enough was judged", kClass});
+    io::JunitCase& stopped = junit.emplace_back(io::JunitCase{kEnoughJudged, kClass});
     stopped.outcome = io::JunitOutcome::error;
     stopped.message = how_far;
     failures.push_back({stopped.name, how_far, options.again});
@@ -446,7 +448,7 @@ int judge(JudgeOptions options) {
   print_written(options.report);
   if (complete && holds) insist("{}\n", holding("all hold"));
   if (complete && !holds) insist("{}{}{}\n", failing("FAILS"), failed.empty() ? "" : ": ", fmt::join(failed, ", "));
-  print_annotations(failures);
+  tell_github({options.again, failures});
   return holds ? 0 : 1;
 }
 

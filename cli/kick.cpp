@@ -95,10 +95,10 @@ nlohmann::json to_json(const harness::RecordedKick& kick, std::size_t number, co
 
 nlohmann::json to_json(const KickOptions& options, const harness::RecordedKick& kick,
                        const oracles::KickReport& report) {
-  nlohmann::json kicks = nlohmann::json::array(), verdicts = io::verdicts_json(report.verdicts);
+  nlohmann::json kicks = nlohmann::json::array(), verdicts = io::verdicts_json(report.verdicts, false);
   for (std::size_t k = 0; k < report.kicks.size(); ++k) {
     kicks.push_back(to_json(kick, k, report.kicks[k]));
-    for (nlohmann::json verdict : io::verdicts_json(report.kicks[k].verdicts)) {
+    for (nlohmann::json verdict : io::verdicts_json(report.kicks[k].verdicts, false)) {
       verdict["kick"] = k;
       verdicts.push_back(std::move(verdict));
     }

@@ -70,7 +70,7 @@ nlohmann::json to_json(const RelateOptions& options, const harness::JudgedRelati
           {"particles", judged.particles},
           {"sharpest", sharpest},
           {"differences", differences},
-          {"verdicts", io::verdicts_json(judged.verdicts)},
+          {"verdicts", io::verdicts_json(judged.verdicts, false)},
           {"not_judged", not_judged_json(judged.not_judged)},
           {"summary", {{"holds", judged.holds()}, {"verdicts", judged.verdicts.size()}, {"failed", failed}}},
           {"notes", notes}};
@@ -157,7 +157,7 @@ int relate(const RelateOptions& options) {
   const nlohmann::json document = to_json(options, judged, notes);
   write_document(options.json, document);
   if (!options.report.empty()) write_relate_page(options.report, map, options.files, judged, document, options.again);
-  const Judging judging{"cutproof relate", "cutproof.relate." + map.name(), options.again, Judging::Of::frames};
+  const Judging judging{"cutproof relate", class_of("relate", map.name()), options.again, Judging::Of::frames};
   say("relate {}: {} frames of {} particles\n", options.map, judged.frames, judged.particles);
   Shown shown{options.again};
   shown.in_stages = false;

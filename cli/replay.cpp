@@ -62,15 +62,17 @@ int replay(const ReplayOptions& options) {
   }
   if (judgement.failure) {
     insist("{}: {}\n", failing("FAILS"), describe(*judgement.failure));
-    print_annotations(failures_of({*judgement.failure}, {.suite = {}, .class_name = {}, .again = options.again}));
+    tell_github(
+        {options.again, failures_of({*judgement.failure}, {.suite = {}, .class_name = {}, .again = options.again})});
     return 1;
   }
   if (judgement.verdicts == 0) {
     insist("{}: nothing was judged\n", failing("FAILS"));
-    print_annotations({{"enough was judged", "nothing was judged", options.again}});
+    tell_github({options.again, {{kEnoughJudged, "nothing was judged", options.again}}});
     return 1;
   }
   insist("{}: {} verdicts\n", holding("holds"), judgement.verdicts);
+  tell_github({options.again});
   return 0;
 }
 

@@ -10,9 +10,11 @@
 #include <vector>
 
 #include "cli/against_report.h"
+#include "cli/baseline.h"
 #include "cli/commands.h"
 #include "cli/errors_report.h"
 #include "cli/findings.h"
+#include "cli/interruption.h"
 #include "cli/mesh_report.h"
 #include "cli/options.h"
 #include "cli/output.h"
@@ -29,6 +31,7 @@
 #include "harness/backends.h"
 #include "harness/run_session.h"
 #include "model/counted.h"
+#include "model/io/columns.h"
 #include "model/io/recording.h"
 #include "model/io/scene_io.h"
 #include "model/io/verdict_json.h"
@@ -55,10 +58,13 @@ struct RunOptions {
   std::string errors;         // names of errors with commas between them, or "all"; empty: none
   int64_t error_frames = harness::ErrorsWanted{}.frames;
   std::string record;
-  std::string json, junit, report;
+  std::string json, junit, report, baseline;
   std::string preview;  // a page of the scene before it runs, and nothing else
   std::string again;    // the command line
 };
+
+// [iterations of a particle] Beyond that a run takes minutes.
+constexpr double kLongWork = 1e9;
 
 constexpr const char* kNextSteps =
     "cutproof run needs a scene. Try\n"
@@ -101,6 +107,13 @@ void print_header(const Scene& scene, const fixtures::Built& built, const RunOpt
   say("{} of {} × {}, backend {}, seed {}\n", counted(built.setup.frame_count(), "frame", "frames"),
       counted(step.substeps, "substep", "substeps"), counted(step.iterations, "iteration", "iterations"),
       options.backend.name, scene.seed);
+  const auto moves = static_cast<double>(built.setup.frame_count()) * step.substeps * step.iterations *
+                     static_cast<double>(built.setup.body.particle_count());
+  if (moves < kLongWork) return;
+  say("long work: an iteration moves each particle, {:.1g} moves in all, of which one core makes some 1e7 a second; "
+      "--frames N stops early, and what was judged by then is kept at the first Ctrl-C\n",
+      moves);
+  flush_output();
 }
 
 void print_summary(const RunResult& result) {
@@ -132,6 +145,12 @@ void print_summary(const RunResult& result) {
   const int64_t clusters = result.frames.empty() ? result.clusters_at_start : result.frames.back().clusters;
   say("removed {} ({} as debris); clusters {} -> {}\n", counted(removed + debris, "particle", "particles"), debris,
       result.clusters_at_start, clusters);
+}
+
+// Of a run that somebody stopped; empty of every other.
+std::string how_far(const RunSession& session, const fixtures::Built& built) {
+  if (!session.is_stopped()) return "";
+  return fmt::format("it was stopped after {} of {} frames", session.frames().size(), built.setup.frame_count());
 }
 
 constexpr const char* kConservation = "conservation";
@@ -198,6 +217,7 @@ nlohmann::json document_of(const RunSession& session, const RunResult& result, c
   nlohmann::json document = to_json(result, session.judge());
   document["build"] = build_json(built);
   document["changes"] = given_changes(changes);
+  document["complete"] = !session.is_stopped();
   if (session.judge() == nullptr) {
     document["left_to_reference"] = {{"stages", session.left_to_reference()}, {"expected", nlohmann::json::array()}};
   }
@@ -227,7 +247,8 @@ void write_run_page(const RunOptions& options, const RunSession& session, const 
                beside ? &*beside : nullptr);
 }
 
-std::vector<io::JunitCase> cases_of_run(const RunSession& session, const Judging& judging) {
+std::vector<io::JunitCase> cases_of_run(const RunSession& session, const Judging& judging, const std::string& how_far,
+                                        const SinceBaseline* since) {
   std::vector<io::JunitCase> cases =
       session.judge() != nullptr ? cases_of(*session.judge(), judging) : cases_of(session.broken_contracts(), judging);
   const auto add = [&](std::vector<io::JunitCase> more) {
@@ -238,6 +259,10 @@ std::vector<io::JunitCase> cases_of_run(const RunSession& session, const Judging
   if (session.errors() != nullptr && session.errors()->conservation()) {
     add({conservation_case(*session.errors(), judging)});
   }
+  if (!how_far.empty()) {
+    add({{kEnoughJudged, judging.class_name, 0, io::JunitOutcome::error, how_far, "see it again: " + judging.again}});
+  }
+  if (since != nullptr) excuse_known(*since, cases);
   return cases;
 }
 
@@ -259,19 +284,27 @@ void conclude_run(const RunSession& session, const std::string& again) {
   print_conclusion(all, of_the_run, "what was compared holds.");
 }
 
-void annotate_run(const RunSession& session, const Judging& judging) {
+void tell_github_of_run(const RunSession& session, const Judging& judging, const std::string& how_far,
+                        const SinceBaseline* since) {
   const harness::SceneJudge* const judge = session.judge();
-  std::vector<Failure> failures =
-      judge != nullptr ? failures_of(judge->verdicts(), judging,
-                                     [&](const Verdict& verdict) { return judge->is_expected_failure(verdict); })
-                       : failures_of(session.broken_contracts(), judging);
+  const auto is_excused = [&](const Verdict& verdict) {
+    return (judge != nullptr && judge->is_expected_failure(verdict)) ||
+           (since != nullptr && since->is_known(verdict, true));
+  };
+  ForGitHub said = {judging.again,
+                    failures_of(judge != nullptr ? judge->verdicts() : session.broken_contracts(), judging, is_excused),
+                    judge != nullptr ? judge->left_to_reference() : session.left_to_reference()};
   if (session.against() != nullptr) {
-    for (Failure& failure : failures_of(session.against()->verdicts(), judging)) failures.push_back(std::move(failure));
+    for (Failure& failure : failures_of(session.against()->verdicts(), judging, is_excused))
+      said.failures.push_back(std::move(failure));
   }
-  if (session.errors() != nullptr && !session.errors()->holds()) {
-    failures.push_back({kConservation, kNotConserved, judging.again});
+  if (session.errors() != nullptr && !session.errors()->holds() &&
+      (since == nullptr || !since->is_known(kConservation))) {
+    said.failures.push_back({kConservation, kNotConserved, judging.again});
   }
-  print_annotations(failures, judge != nullptr ? judge->left_to_reference() : session.left_to_reference());
+  if (!how_far.empty()) said.failures.push_back({kEnoughJudged, how_far, judging.again});
+  if (since != nullptr) add_baseline_to(said, *since);
+  tell_github(said);
 }
 
 // Nothing runs, so there is nothing to judge, to compare or to write.
@@ -282,6 +315,7 @@ void require_alone(const RunOptions& options) {
                                     {"--record", &options.record},
                                     {"--json", &options.json},
                                     {"--junit", &options.junit},
+                                    {"--baseline", &options.baseline},
                                     {"--report", &options.report}}) {
     if (!value->empty())
       refuse("--preview", fmt::format("nothing runs, so {} has nothing to work on", name),
@@ -326,29 +360,41 @@ int run(const RunOptions& options) {
   if (!options.junit.empty() && !observers.judge && !observers.against) {
     refuse("--junit", "nothing is judged, so there are no test cases", "add --check or --against");
   }
+  if (!options.baseline.empty() && !observers.judge && !observers.against) {
+    refuse("--baseline", "nothing is judged that could be compared with it", "add --check or --against");
+  }
+  const std::optional<Baseline> baseline =
+      read_baseline(options.baseline, {"cutproof.run", "cutproof.check"}, scene.name);
   RunSession session(
       {built.setup, built.state, scene.expect, options.backend.name, recorded_scene(scene, build_options.mesh),
        built.schedule.is_cut_short ? options.frames : std::nullopt, notes},
       observers, *backend, [&] { return make_backend(options.backend); });
+  const EndsInOrder in_order;
   print_header(scene, built, options);
   {
     Progress progress("frame", built.setup.frame_count());
-    session.run([&](const harness::FrameResult& frame) {
-      progress.show(frame.frame + 1, fmt::format("{} clusters, {} particles", frame.clusters, frame.alive));
-    });
+    progress.tell("the first one is running");
+    session.run(
+        [&](const harness::FrameResult& frame) {
+          progress.show(frame.frame + 1, fmt::format("{} clusters, {} particles", frame.clusters, frame.alive));
+        },
+        stop_asked);
   }
 
   const RunResult result{"run",           options.scene.file, options.backend.name,
                          scene,           built.setup.body,   built.state.clusters.count(),
                          session.frames()};
-  const nlohmann::json document = document_of(session, result, built, changes);
+  nlohmann::json document = document_of(session, result, built, changes);
+  const std::optional<SinceBaseline> compared = since_baseline(baseline, document);
+  const SinceBaseline* const since = compared ? &*compared : nullptr;
+  const std::string stopped = how_far(session, built);
   // Files first: they are kept even if standard output cannot be written.
   write_document(options.json, document);
   write_run_page(options, session, document);
-  const Judging judging{"cutproof run", "cutproof.run." + scene.name, options.again};
+  const Judging judging{"cutproof run", class_of("run", scene.name), options.again};
   if (!options.junit.empty()) {
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
-    write_junit(options.junit, judging, seconds.count(), cases_of_run(session, judging));
+    write_junit(options.junit, judging, seconds.count(), cases_of_run(session, judging, stopped, since));
   }
 
   print_summary(result);
@@ -365,8 +411,10 @@ int run(const RunOptions& options) {
   print_written(options.junit);
   print_written(options.report);
   conclude_run(session, options.again);
-  annotate_run(session, judging);
-  return session.holds() ? 0 : 1;
+  if (since != nullptr) print_since(*since);
+  if (!stopped.empty()) insist("{}: {}\n", undecided("INCOMPLETE"), stopped);
+  tell_github_of_run(session, judging, stopped, since);
+  return session.holds() || (since != nullptr && since->fresh.empty() && stopped.empty()) ? 0 : 1;
 }
 
 }  // namespace
@@ -420,6 +468,7 @@ void add_run(CLI::App& program, Work& work) {
       ->add_option("--preview", options->preview,
                    "write a page for a browser that shows the body and the way of the blade; nothing runs")
       ->type_name("F");
+  add_baseline(*command, options->baseline);
   command->callback([options, command, &work] {
     options->again = as_given(*command);
     // Whoever writes --check before the scene means no depth by it.

@@ -85,19 +85,16 @@ std::string short_figure(double value) {
 }
 
 // Of a bound, in as many columns as its head has.
-std::string share(double of_bound) {
-  return of_bound > 0 && of_bound < 0.001 ? "<0.001" : fmt::format("{:.2g}", of_bound);
-}
+std::string share(double of_bound) { return of_bound > 0 && of_bound < 0.001 ? "<0.001" : io::share_of(of_bound); }
 
 std::string plural(int64_t count, const char* one, const char* several) {
   return fmt::format("{} {}", io::grouped(count), count == 1 ? one : several);
 }
 
-// What a scene expects is not of a stage.
 bool is_expectation(const Row& row) { return row.any->property.starts_with(oracles::kExpectation); }
 
 std::string name_of_row(const Row& row, const Shown& shown) {
-  const bool has_stage = shown.in_frames && shown.in_stages && !is_expectation(row);
+  const bool has_stage = shown.in_frames && shown.in_stages && oracles::is_of_a_moment(row.any->property);
   return has_stage ? fmt::format("{} after {}", row.any->property, name_of(row.any->stage)) : row.any->property;
 }
 
@@ -179,7 +176,7 @@ void print_holding(const std::vector<Row>& rows, const Shown& shown) {
   const int64_t right = oracles::count_properties(counted_rows).hold;
   std::vector<std::string> expected;
   for (const Row& row : rows) {
-    if (row.looked == 0 || wrong.contains(row.any->property)) continue;
+    if (row.looked == 0 || wrong.contains(row.any->property) || oracles::is_of_the_judging(row.any->property)) continue;
     if (is_expectation(row)) {
       expected.push_back(fmt::format("{}: {}", row.any->property.substr(oracles::kExpectation.size()),
                                      io::in_unit(figure(row.any->measured), row.any->unit)));
@@ -193,7 +190,7 @@ void print_holding(const std::vector<Row>& rows, const Shown& shown) {
   say("{}{} {}, in {}", expected.empty() ? "\n" : "", plural(right, "property", "properties"),
       right == 1 ? holding("holds") : holding("hold"), plural(verdicts, "verdict", "verdicts"));
   if (nearest != nullptr) {
-    say("; the nearest to its bound: {}, at {:.2g} of it", name_of_row(*nearest, shown), nearest->of_bound);
+    say("; the nearest to its bound: {}, at {} of it", name_of_row(*nearest, shown), io::share_of(nearest->of_bound));
   }
   say(".\n");
 }
@@ -298,7 +295,7 @@ void print_judged(const harness::PropertySummaries& properties, int64_t harness:
   for (const harness::PropertySummary& p : properties.all()) {
     const std::string failed = fmt::format("{}", p.failed);
     table.add({p.property, fmt::format("{}", p.*judged), p.failed > 0 ? failing(failed) : failed,
-               p.of_bound ? fmt::format("{:.2g}", *p.of_bound) : "-"});
+               p.of_bound ? io::share_of(*p.of_bound) : "-"});
   }
   say_as_it_is(table.text());
 }
@@ -309,10 +306,12 @@ void print_conclusion(const std::vector<Verdict>& verdicts, const Shown& shown, 
 }
 
 void print_conclusion(const harness::SceneJudge& judge) {
-  const char* const holds = !judge.left_to_reference().empty() ? "what the backend ran holds."
-                            : judge.not_reached().empty()      ? "everything holds."
-                                                               : "what was reached holds.";
-  print_conclusion(judge.verdicts().size(), failures_in(judge.verdicts(), shown_of(judge, "")), judge.holds(), holds);
+  const char* const holds = judge.is_stopped()                   ? "what was reached holds."
+                            : !judge.left_to_reference().empty() ? "what the backend ran holds."
+                            : judge.not_reached().empty()        ? "everything holds."
+                                                                 : "what was reached holds.";
+  const int64_t failed = failures_in(judge.verdicts(), shown_of(judge, ""));
+  print_conclusion(judge.verdicts().size(), failed, failed == 0, holds);
 }
 
 }  // namespace cutproof::cli

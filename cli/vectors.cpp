@@ -161,7 +161,7 @@ int check_vectors(const CheckVectorsOptions& options) {
   std::vector<io::JunitCase> cases = junit_cases(vectors, report, seconds, options.again, failures);
   write_junit(options.junit, {"cutproof check-vectors", kVectorsClass, options.again}, seconds, std::move(cases));
   insist("{}\n", report.holds() ? holding("all hold") : failing("FAILS"));
-  print_annotations(failures);
+  tell_github({options.again, failures});
   return report.holds() ? 0 : 1;
 }
 
@@ -170,7 +170,7 @@ int check_vectors(const CheckVectorsOptions& options) {
 void add_vectors(CLI::App& program, Work& work) {
   const auto options = std::make_shared<VectorsOptions>();
   CLI::App* const command =
-      program.add_subcommand("vectors", "test vectors for single kernels, as a file that any program reads");
+      program.add_subcommand("vectors", "test vectors for single kernels, as a file for any program");
   command->add_option("operation", options->operation, operation_names())
       ->required()
       ->type_name("OP")

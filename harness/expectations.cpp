@@ -152,7 +152,8 @@ ExpectationCheck::Judged ExpectationCheck::judged(const StagesRun& stages) const
     const std::string stroke = std::to_string(s + 1), what = "components after stroke " + stroke;
     if (!is_its_own(what, removal)) continue;
     const bool exists = s < after_stroke_.size();
-    if (exists && !is_whole && setup_.stroke_end[s] < 0) {
+    const bool is_reached = exists && setup_.stroke_end[s] >= 0 && setup_.stroke_end[s] < frames_seen_;
+    if (exists && !is_whole && !is_reached) {
       found.not_reached.push_back(what);
       continue;
     }

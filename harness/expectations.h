@@ -23,6 +23,8 @@ class ExpectationCheck {
   ExpectationCheck(const Setup& setup, const Expectations& expectations, const Snapshot& initial,
                    Extent extent = Extent::whole);
 
+  // It turns out that the run is cut short.
+  void cut_short() { extent_ = Extent::cut_short; }
   // Every moment; only the ends of frames are looked at, and of them only those that are well formed.
   void see(const Moment& moment);
 

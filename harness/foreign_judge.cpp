@@ -357,9 +357,8 @@ ForeignVerdicts judge_foreign_state(const ForeignState& foreign) {
   }
   Verdict judged = of_file("something was judged", "oracles.md, Somebody else's state");
   judged.checked = 1;
-  judged.measured = anything_was_judged(found.verdicts) ? 1 : 0;
-  judged.bound = 1;
-  judged.holds = judged.measured > 0;
+  judged.holds = anything_was_judged(found.verdicts);
+  judged.measured = judged.holds ? 0 : 1;
   if (!judged.holds) {
     judged.witness.text = "there was nothing to judge: no particles, or nothing of what is promised is in the file";
   }

@@ -30,6 +30,7 @@ nlohmann::json to_json(const PropertySummary& summary) {
           {"checked", summary.checked},
           {"failed", summary.failed},
           {"undecided", summary.undecided},
+          {"seconds", summary.seconds},
           {"measured", json_number(summary.measured)},
           {"of_bound", json_number(summary.of_bound)}};
 }
@@ -38,6 +39,7 @@ void add_summary(nlohmann::json& sum, const nlohmann::json& more) {
   for (const char* count : {"judged", "checked", "failed", "undecided"}) {
     sum[count] = sum.at(count).get<int64_t>() + more.at(count).get<int64_t>();
   }
+  sum["seconds"] = sum.at("seconds").get<double>() + more.at("seconds").get<double>();
   for (const char* greatest : {"measured", "of_bound"}) {
     // A number, nothing, or of what failed a word such as "inf".
     const nlohmann::json &here = sum.at(greatest), &there = more.at(greatest);
@@ -47,9 +49,12 @@ void add_summary(nlohmann::json& sum, const nlohmann::json& more) {
   }
 }
 
-nlohmann::json PropertySummaries::to_json() const {
+nlohmann::json PropertySummaries::to_json(bool in_stages) const {
   nlohmann::json list = nlohmann::json::array();
-  for (const PropertySummary& summary : all_) list.push_back(harness::to_json(summary));
+  for (const PropertySummary& summary : all_) {
+    list.push_back(harness::to_json(summary));
+    if (!in_stages) list.back()["stage"] = nullptr;
+  }
   return list;
 }
 
@@ -80,6 +85,7 @@ void PropertySummaries::add(const Verdict& verdict, int64_t judged, int64_t fail
   summary.checked += verdict.checked;
   summary.failed += failed;
   summary.undecided += verdict.undecided;
+  summary.seconds += verdict.took.seconds;
   if (verdict.checked == 0) return;
   raise(summary.measured, verdict.measured);
   if (verdict.bound > 0 && std::isfinite(verdict.bound)) {
@@ -94,6 +100,7 @@ void PropertySummaries::join(const PropertySummaries& other) {
     ours.checked += theirs.checked;
     ours.failed += theirs.failed;
     ours.undecided += theirs.undecided;
+    ours.seconds += theirs.seconds;
     raise(ours.measured, theirs.measured);
     raise(ours.of_bound, theirs.of_bound);
   }

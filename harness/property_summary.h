@@ -19,6 +19,7 @@ struct PropertySummary {
   int64_t checked = 0;    // things that they looked at
   int64_t failed = 0;     // expected or not
   int64_t undecided = 0;  // of what was checked (Verdict::undecided)
+  double seconds = 0;     // of judging, by all threads (Verdict::took)
   double measured = 0;    // greatest
   // Greatest measured / bound: how much room the bound leaves to what was found. Nothing where every bound is 0, as it
   // is of what is counted.
@@ -38,8 +39,8 @@ class PropertySummaries {
 
   // In the order in which they were first added.
   const std::vector<PropertySummary>& all() const { return all_; }
-  // A list of them.
-  nlohmann::json to_json() const;
+  // A list of them. `in_stages`: else they are of what has no stages, and name none.
+  nlohmann::json to_json(bool in_stages = true) const;
   // Null if no verdict of this property after this stage was added.
   const PropertySummary* find(const std::string& property, Stage stage) const;
 

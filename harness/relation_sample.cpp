@@ -9,6 +9,7 @@
 #include "oracles/iterates/probe.h"
 #include "oracles/oracles.h"
 #include "oracles/relations/relations.h"
+#include "oracles/timed.h"
 
 namespace cutproof::harness {
 
@@ -55,7 +56,6 @@ void RelationSample::see(const Moment& moment) {
     wait();
     asking_ = std::async(std::launch::async, [this, begin, turn = asked_++] { return ask(*begin, turn); });
   }
-  if (moment.after->frame >= setup_.frame_count()) wait();
 }
 
 void RelationSample::wait() {
@@ -72,12 +72,15 @@ std::vector<Verdict> RelationSample::ask(const State& begin, int64_t turn) {
   const auto particle = first == pieces.label.end() ? -1 : static_cast<int32_t>(first - pieces.label.begin());
   // Some iterations even where the scene has none: a simulator that makes some is judged by them.
   const int32_t iterations = std::max(setup_.step.iterations, 2);
-  std::vector<Verdict> verdicts = {oracles::no_ghost_force(*second_, setup_, begin, particle, h * kKick, 1),
-                                   oracles::energy_is_monotone(*second_, frictionless_, begin, iterations),
-                                   oracles::rest_is_fixed(*second_, setup_, begin),
-                                   oracles::translation_is_exact(*second_, setup_, begin, (h / dt) * kThrow),
-                                   oracles::step_by_iterates(*second_, setup_, begin, oracles::Iterates::sampled,
-                                                             static_cast<uint64_t>(begin.frame))};
+  using oracles::timed;
+  std::vector<Verdict> verdicts = {
+      timed([&] { return oracles::no_ghost_force(*second_, setup_, begin, particle, h * kKick, 1); }),
+      timed([&] { return oracles::energy_is_monotone(*second_, frictionless_, begin, iterations); }),
+      timed([&] { return oracles::rest_is_fixed(*second_, setup_, begin); }),
+      timed([&] { return oracles::translation_is_exact(*second_, setup_, begin, (h / dt) * kThrow); }), timed([&] {
+        return oracles::step_by_iterates(*second_, setup_, begin, oracles::Iterates::sampled,
+                                         static_cast<uint64_t>(begin.frame));
+      })};
   for (Verdict& verdict : verdicts) {
     verdict.stage = Stage::step;
     verdict.frame = begin.frame;

@@ -29,7 +29,9 @@ class RelationSample {
   // Every moment of one body in order, whoever ran it. When a frame ends that is asked, its relations begin to run in a
   // thread of their own; what that throws the next call throws.
   void see(const Moment& moment);
-  // Of what has been asked all but the last frame, and that one too once the schedule is over.
+  // Until what was asked last is answered.
+  void wait();
+  // Of what has been asked all but the last frame, and that one too after wait().
   std::vector<Verdict> take_verdicts();
 
   // How many frames were asked, and what could not be asked of this backend: one sentence each.
@@ -37,7 +39,6 @@ class RelationSample {
 
  private:
   std::vector<Verdict> ask(const State& begin, int64_t turn);
-  void wait();
 
   const Setup& setup_;
   const Setup frictionless_;  // friction has no energy, so it is left out where energy is asked about

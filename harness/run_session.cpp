@@ -28,7 +28,7 @@ RunSession::RunSession(RunInput input, Observers wanted, Backend& backend, oracl
                     input_.cut_short_at);
 }
 
-void RunSession::run(const std::function<void(const FrameResult&)>& on_frame) {
+void RunSession::run(const std::function<void(const FrameResult&)>& on_frame, const StopAsked& stop_asked) {
   FrameRunner runner(backend_, {input_.setup}, {input_.start});
   const auto state = [&]() -> const Snapshot& { return runner.states().front(); };
   begin(state());
@@ -36,13 +36,14 @@ void RunSession::run(const std::function<void(const FrameResult&)>& on_frame) {
   if (judge_ || recorder_ || against_) {
     observer = [&](const Moment& moment) { see(moment, runner.ran()[static_cast<std::size_t>(moment.span.last)]); };
   }
-  while (!runner.is_over()) {
+  while (!runner.is_over() && !is_asked(stop_asked)) {
     const bool is_measured = errors_ && errors_->wants(state()->frame);
     if (is_measured) errors_->frame_begins(*state());
     frames_.push_back(runner.run_frame(observer));
     if (is_measured) errors_->frame_ends(*state());
     on_frame(frames_.back());
   }
+  is_stopped_ = !runner.is_over();
   broken_ = runner.take_broken_contracts();
   finish(state());
 }
@@ -72,12 +73,16 @@ void RunSession::begin(const Snapshot& loaded) {
   against_->observe_reference(add);
 }
 
+void RunSession::take_relations() {
+  for (Verdict& verdict : relations_->take_verdicts()) judge_->add(std::move(verdict));
+}
+
 void RunSession::see(const Moment& moment, bool launched) {
   stages_.see(input_.setup, moment);
   if (judge_) judge_->see(moment);
   if (relations_) {
     relations_->see(moment);
-    for (Verdict& verdict : relations_->take_verdicts()) judge_->add(std::move(verdict));
+    take_relations();
   }
   if (recorder_ && not_recorded_) recorder_->add(not_recorded_->first, *moment.before);
   not_recorded_.emplace(moment.span.last, moment.after);
@@ -96,14 +101,19 @@ void RunSession::compare(const Moment& moment, bool launched) {
 
 void RunSession::finish(const Snapshot& end) {
   if (judge_) {
+    if (relations_) {
+      relations_->wait();
+      take_relations();
+    }
     for (const Verdict& verdict : broken_) judge_->add(verdict);
     if (relations_) {
       for (std::string& sentence : relations_->notes()) judge_->note(std::move(sentence));
     }
     for (std::string& sentence : input_.notes) judge_->note(std::move(sentence));
+    if (is_stopped_) judge_->stop();
     judge_->finish();
   }
-  if (errors_) errors_->finish(*end);
+  if (errors_ && !is_stopped_) errors_->finish(*end);
   if (recorder_) {
     if (not_recorded_) recorder_->add(not_recorded_->first, *not_recorded_->second);
     recorder_->finish();
@@ -118,7 +128,7 @@ void RunSession::finish(const Snapshot& end) {
 }
 
 bool RunSession::holds() const {
-  return broken_.empty() && (!judge_ || judge_->holds()) && (!against_ || against_->holds()) &&
+  return !is_stopped_ && broken_.empty() && (!judge_ || judge_->holds()) && (!against_ || against_->holds()) &&
          (!errors_ || errors_->holds());
 }
 

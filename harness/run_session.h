@@ -16,6 +16,7 @@
 #include "harness/scene_judge.h"
 #include "model/backend.h"
 #include "model/io/recording.h"
+#include "model/stop.h"
 
 namespace cutproof::harness {
 
@@ -47,9 +48,11 @@ class RunSession {
   // that a folder that cannot be written to is known before anything runs.
   RunSession(RunInput input, Observers wanted, Backend& backend, oracles::MakeBackend make);
 
-  // All frames; `on_frame` is told the end of each. Throws InputError if a comparison is wanted of a backend that runs
-  // several stages in one piece.
-  void run(const std::function<void(const FrameResult&)>& on_frame);
+  // All frames, or those until it is asked to stop; `on_frame` is told the end of each. Of a run that was stopped
+  // errors that take runs of their own are not measured. Throws InputError if a comparison is wanted of a backend that
+  // runs several stages in one piece.
+  void run(const std::function<void(const FrameResult&)>& on_frame, const StopAsked& stop_asked = {});
+  bool is_stopped() const { return is_stopped_; }
 
   // The rest is complete after run(). Null is what was not wanted.
   const std::vector<FrameResult>& frames() const { return frames_; }
@@ -68,6 +71,7 @@ class RunSession {
  private:
   void begin(const Snapshot& loaded);
   void see(const Moment& moment, bool launched);
+  void take_relations();
   void compare(const Moment& moment, bool launched);
   void finish(const Snapshot& end);
 
@@ -85,6 +89,7 @@ class RunSession {
   // The last state is recorded as the next moment begins: the backend may have rounded what it was handed.
   std::optional<std::pair<Stage, Snapshot>> not_recorded_;
   std::vector<FrameResult> frames_;
+  bool is_stopped_ = false;
   std::vector<Verdict> broken_;
   std::unique_ptr<io::RecordingReader> recording_, reference_recording_;
 };

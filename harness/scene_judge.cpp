@@ -24,14 +24,20 @@ void SceneJudge::see(const Moment& moment) {
   expectations_.see(moment);
 }
 
+void SceneJudge::stop() {
+  is_stopped_ = true;
+  expectations_.cut_short();
+  note(fmt::format("The run was stopped after {} of {} frames.", judge_.frame(), setup_.frame_count()));
+}
+
 void SceneJudge::finish() {
-  const auto whole = [&](const char* what, bool holds, double measured, double bound, const std::string& text) {
+  // `missing`: so much of what should be there is not.
+  const auto whole = [&](const char* what, bool holds, double missing, const std::string& text) {
     Verdict verdict;
     verdict.property = what;
     verdict.frame = std::max<int64_t>(judge_.frame() - 1, 0);
     verdict.holds = holds;
-    verdict.measured = measured;
-    verdict.bound = bound;
+    verdict.measured = missing;
     verdict.unit = "1";
     verdict.bound_source = "oracles.md, A whole run";
     verdict.checked = 1;
@@ -59,28 +65,32 @@ void SceneJudge::finish() {
     note("The run stops before anything that the scene expects could be told: no outcome was held against it.");
   }
   const auto frames = static_cast<double>(setup_.frame_count()), seen = static_cast<double>(judge_.frame());
-  whole("the run is whole", seen == frames, seen, frames,
-        fmt::format("it ends after frame {} of {}", judge_.frame(), setup_.frame_count()));
+  if (!is_stopped_)
+    whole("the run is whole", seen == frames, frames - seen,
+          fmt::format("it ends after frame {} of {}", judge_.frame(), setup_.frame_count()));
   for (const auto& [property, looked] : properties) {
     if (looked.checked > 0 || looked.excused) continue;
-    whole("every property looked at something", false, 0, 1,
+    whole("every property looked at something", false, 1,
           fmt::format("'{}' holds, but it looked at nothing and does not say why", property));
   }
   int64_t judged = 0;
   for (const PropertySummary& summary : summaries_.all()) judged += summary.judged;
   const bool is_empty = seen == 0 || setup_.body.particle_count() == 0;
   const bool ran_nothing = !stages_.any_by_backend() && !stages_.left().empty();
-  const double moments = ran_nothing ? 0 : seen * setup_.body.particle_count();
-  whole("something was judged", judged > 0 && moments > 0, moments, 1,
-        ran_nothing ? "the backend ran no stage: the reference ran all of them for it"
-        : is_empty  ? "there was nothing to judge: there are no frames, or the body has no particles"
-                    : "no property looked at anything");
+  const bool any_judged = judged > 0 && !ran_nothing && !is_empty;
+  // A run that is stopped before its first frame ends is not called empty.
+  if (any_judged || !is_stopped_)
+    whole("something was judged", any_judged, any_judged ? 0 : 1,
+          ran_nothing ? "the backend ran no stage: the reference ran all of them for it"
+          : is_empty  ? "there was nothing to judge: there are no frames, or the body has no particles"
+                      : "no property looked at anything");
 }
 
 bool SceneJudge::holds() const {
   const auto& all = verdicts();
-  return std::all_of(all.begin(), all.end(),
-                     [this](const Verdict& verdict) { return verdict.holds || is_expected_failure(verdict); });
+  return !is_stopped_ && std::all_of(all.begin(), all.end(), [this](const Verdict& verdict) {
+    return verdict.holds || is_expected_failure(verdict);
+  });
 }
 
 std::vector<std::string> SceneJudge::notes_beside_lists() const {

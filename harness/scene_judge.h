@@ -23,6 +23,10 @@ class SceneJudge {
   // A sentence that the reader of the verdicts has to know as well.
   void note(std::string sentence) { notes_.push_back(std::move(sentence)); }
 
+  // Nothing comes after this but finish(): somebody stopped the run. What was judged stands, and the whole does not
+  // hold.
+  void stop();
+  bool is_stopped() const { return is_stopped_; }
   // After the last moment: what the scene expects, whether the run came to the end of its schedule, and whether each
   // property that applied looked at anything at all. A run of which nothing was judged does not hold, nor does one in
   // which the backend ran no stage.
@@ -58,6 +62,7 @@ class SceneJudge {
   StagesRun stages_;
   std::vector<std::string> notes_, not_reached_, not_its_own_;
   ExpectationCheck expectations_;
+  bool is_stopped_ = false;
 };
 
 }  // namespace cutproof::harness

@@ -25,6 +25,12 @@ struct Witness {
   friend bool operator==(const Witness&, const Witness&) = default;
 };
 
+// Wall time [s] of judging, which says nothing of what was judged: any two are equal.
+struct JudgingTime {
+  double seconds = 0;
+  friend bool operator==(JudgingTime, JudgingTime) { return true; }
+};
+
 struct Verdict {
   std::string property;       // "cluster connectivity", "coverage", …: the names of docs/reference/oracles.md
   Stage stage = Stage::skin;  // after which stage the state was judged
@@ -40,6 +46,7 @@ struct Verdict {
   std::string vacuous = {};  // why there was nothing to look at, e.g. "no blade"; empty if there was
   int64_t undecided = 0;     // how many things may be wrong and were not found to be: they count as right, and here
   Witness witness;           // empty if it holds
+  JudgingTime took = {};     // 0 where it was not measured, or where an earlier verdict is repeated
 
   friend bool operator==(const Verdict&, const Verdict&) = default;
 };

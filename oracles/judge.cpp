@@ -52,6 +52,7 @@ struct Judge::Memory {
     if (known != held.end()) {
       Verdict verdict = known->verdict;
       verdict.frame = last->frame;
+      verdict.took = {};
       return verdict;
     }
     Verdict verdict = ask(property, *judged);

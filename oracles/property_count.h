@@ -10,6 +10,19 @@ namespace cutproof::oracles {
 // What a scene expects of its whole run is no property of the method: the names of those verdicts begin so.
 inline constexpr std::string_view kExpectation = "expected ";
 
+// Nor is what is asked of the judging itself: whether anything was judged, and all of it.
+inline bool is_of_the_judging(std::string_view property) {
+  for (const char* const one :
+       {"something was judged", "something was compared", "the run is whole", "every property looked at something"}) {
+    if (property == one) return true;
+  }
+  return false;
+}
+// Whether a verdict of this name is on a state or a stage: then the stage after which it was judged is told.
+inline bool is_of_a_moment(std::string_view property) {
+  return !property.starts_with(kExpectation) && !is_of_the_judging(property);
+}
+
 // All verdicts of one property after one stage.
 struct AfterStage {
   std::string_view property;
@@ -18,7 +31,7 @@ struct AfterStage {
   bool fails_as_expected = false;
 };
 
-// Of those that looked at something.
+// Of those that looked at something; of the judging itself only what fails.
 struct PropertyCount {
   int64_t hold = 0, fail = 0, fail_as_expected = 0;
   int64_t met = 0, unmet = 0;  // of what the scene expects
@@ -35,7 +48,7 @@ inline PropertyCount count_properties(const std::vector<AfterStage>& all) {
   }
   PropertyCount count;
   for (const auto& [name, one] : by_name) {
-    if (!one.looked) continue;
+    if (!one.looked || (is_of_the_judging(name) && !one.fails)) continue;
     if (name.starts_with(kExpectation)) {
       ++(one.fails || one.fails_as_expected ? count.unmet : count.met);
     } else {

@@ -6,6 +6,7 @@
 
 #include "model/rules.h"
 #include "oracles/checks.h"
+#include "oracles/timed.h"
 
 namespace cutproof::oracles {
 namespace {
@@ -134,9 +135,11 @@ const Property& property_named(const PropertyList& list, std::string_view name) 
 }
 
 Verdict ask(const Property& property, Judged& judged) {
-  Verdict verdict = begin(property, judged.state);
-  property.check_state(judged, verdict);
-  return conclude(std::move(verdict), property.nothing);
+  return timed([&] {
+    Verdict verdict = begin(property, judged.state);
+    property.check_state(judged, verdict);
+    return conclude(std::move(verdict), property.nothing);
+  });
 }
 
 Verdict ask(const Property& property, const StageRun& run, const Verdict& form_before, const Verdict& form_after) {
@@ -147,9 +150,11 @@ Verdict ask(const Property& property, const StageRun& run, const Verdict& form_b
     verdict.frame = run.after.frame;
     return verdict;
   }
-  Verdict verdict = begin(property, run.after);
-  property.check_stage(run, verdict);
-  return conclude(std::move(verdict), property.nothing);
+  return timed([&] {
+    Verdict verdict = begin(property, run.after);
+    property.check_stage(run, verdict);
+    return conclude(std::move(verdict), property.nothing);
+  });
 }
 
 Verdict ask(const Property& property, const Setup& setup, const State& state) {

@@ -230,6 +230,7 @@ void require_fields(const json& part, const std::string& file) {
     for (const char* word : {"property", "stage"}) static_cast<void>(property.at(word).get<std::string>());
     for (const char* count : {"judged", "checked", "failed", "undecided"}) require_count(property, count);
     for (const char* figure : {"measured", "of_bound"}) static_cast<void>(property.at(figure));
+    static_cast<void>(property.at("seconds").get<double>());
   }
   static_cast<void>(left_stages(part));
   for (const json& violation : part.at("violations").get<std::vector<json>>()) {

@@ -155,8 +155,8 @@ PropertyTable property_table(const Field& properties) {
                    : looked ? 1
                             : 2,
                    of_bound.value_or(-1),
-                   {{one["property"].text(), one["stage"].text(), result, io::grouped(judged), io::grouped(failed),
-                     looked || fails ? figure_text(measured) + unit : "–",
+                   {{one["property"].text(), one["stage"].is_nothing() ? "–" : one["stage"].text(), result,
+                     io::grouped(judged), io::grouped(failed), looked || fails ? figure_text(measured) + unit : "–",
                      looked && of_bound ? fmt::format("{:.2g}", *of_bound) : "–", looked ? doubt : "–"},
                     fails                 ? "bad"
                     : looked && !of_bound ? "exact"

@@ -48,7 +48,7 @@ struct Row {
 void add_verdict(const Field& verdict, const Measured* known, std::vector<Row>& rows,
                  std::map<std::pair<std::string, Stage>, std::size_t>& at, Results& results) {
   const std::string property = verdict["property"].text();
-  const Stage stage = verdict["stage"].stage();
+  const Stage stage = results.is_foreign() ? Stage::skin : verdict["stage"].stage();
   const auto [place, is_new] = at.try_emplace({property, stage}, rows.size());
   if (is_new) {
     rows.emplace_back();

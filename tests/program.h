@@ -41,7 +41,7 @@ class Program : public testing::Test {
     files::remove_all(folder_);  // of a process of the same number that was killed
     files::create_directories(folder_);
     // Where tests run there, the program would add annotations to what it prints.
-    unsetenv("GITHUB_ACTIONS");
+    for (const char* const variable : {"GITHUB_ACTIONS", "GITHUB_STEP_SUMMARY"}) unsetenv(variable);
   }
   void TearDown() override { files::remove_all(folder_); }
 

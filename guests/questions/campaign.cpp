@@ -574,7 +574,7 @@ nlohmann::json to_json(const KernelCampaign& campaign) {
           {"failed_cases", campaign.failed_cases},
           {"untested", campaign.untested()},
           {"seconds", campaign.seconds},
-          {"properties", campaign.properties.to_json()},
+          {"properties", campaign.properties.to_json(false)},
           {"kinds", std::move(kinds)},
           {"unpromised", std::move(unpromised)},
           {"failures", std::move(failures)},

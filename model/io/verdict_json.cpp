@@ -32,15 +32,24 @@ nlohmann::json verdict_json(const Verdict& verdict, bool expected_failure) {
   return result;
 }
 
-nlohmann::json verdicts_json(const std::vector<Verdict>& verdicts) {
+nlohmann::json verdicts_json(const std::vector<Verdict>& verdicts, bool in_stages) {
   // A list that push_back makes of null is broken where there is no memory for it (nlohmann::json 3.11).
   nlohmann::json list = nlohmann::json::array();
-  for (const Verdict& verdict : verdicts) list.push_back(verdict_json(verdict, false));
+  for (const Verdict& verdict : verdicts) {
+    list.push_back(verdict_json(verdict, false));
+    if (!in_stages) list.back()["stage"] = nullptr;
+  }
   return list;
 }
 
 std::string in_unit(const std::string& figure, const std::string& unit) {
   return unit == "1" || unit.empty() ? figure : figure + " " + unit;
+}
+
+std::string share_of(double of_bound) {
+  const std::string rounded = fmt::format("{:.2g}", of_bound);
+  if (rounded != "1" || of_bound == 1) return rounded;
+  return of_bound < 1 ? "0.99" : "1.01";
 }
 
 std::string verdict_text(const Verdict& verdict) {

@@ -455,10 +455,9 @@ KickAnswer judge_one(const Differences& differences, const KickReport& report, C
 
 Verdict something_was_judged(const KickedRuns& runs) {
   Verdict verdict = kick_verdict("something was judged", "oracles.md, A kick", "1");
-  verdict.measured = static_cast<double>(std::set<int32_t>(runs.piece.begin(), runs.piece.end()).size());
-  verdict.bound = 2;
+  verdict.holds = std::set<int32_t>(runs.piece.begin(), runs.piece.end()).size() > 1;
+  verdict.measured = verdict.holds ? 0 : 1;
   verdict.checked = 1;
-  verdict.holds = verdict.measured > 1;
   if (!verdict.holds) verdict.witness.text = "there is a single piece, and nobody else who could feel anything";
   return verdict;
 }

@@ -65,5 +65,23 @@ TEST(Annotations, WarnOfStagesThatWereLeftToTheReferenceBesideFailures) {
   EXPECT_EQ(warning("a: b", "100 %"), "::warning title=cutproof: a%3A b::100 %25");
 }
 
+TEST(AStepSummary, SaysInMarkdownWhatFailsAndHowToSeeItAgain) {
+  EXPECT_EQ(step_summary({"cutproof run a_b"}), "### cutproof run a\\_b: holds\n\n");
+  const std::string text = step_summary({"cutproof check x",
+                                         {{"coverage", "a | b\n<c> & *d*", "cutproof check 'x y'"}},
+                                         {"step"},
+                                         {"finite after skin"},
+                                         {"Mended: motion"}});
+  EXPECT_EQ(text,
+            "### cutproof check x: 1 failure\n\n"
+            "- **coverage**: a \\| b\\\\n&lt;c\\> &amp; \\*d\\*\n\n      cutproof check 'x y'\n\n"
+            "Fails as in the baseline: finite after skin\n\n"
+            "Not judged: the reference ran step for the backend\n\n"
+            "Mended: motion\n\n");
+  const std::string many = step_summary({"x", std::vector<Failure>(60, {"coverage", std::string(5000, 'a'), "b"})});
+  EXPECT_LT(many.size(), 200'000u) << "GitHub takes no more than 1 MiB of a step";
+  EXPECT_NE(many.find("- and 10 more\n"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace cutproof::cli::annotations_test

@@ -1,5 +1,6 @@
 // The program, ended from outside at any moment: what it leaves, what it says, and its status.
 #include <fcntl.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
@@ -145,14 +146,37 @@ class Interrupted : public Program {
   int status_ = 0;
 };
 
-TEST_F(Interrupted, ARecordingInTheMiddleLeavesNothingAndEndsAtOnce) {
+TEST_F(Interrupted, RunKeepsWhatItHasJudgedAndSaysHowFarItCame) {
   for (const int signal : kSignals) {
-    start("run " + scene("kidney_discontinuous") + " --check --record seen --json out.json");
-    wait_until([&] { return unfinished().size() == 4; });
+    start("run " + scene("kidney_discontinuous") + " --check --record seen --json out.json --junit out.xml");
+    wait_until_in_the_middle();
     EXPECT_EQ(end(signal), 128 + signal);
-    EXPECT_EQ(listing(), (std::set<std::string>{"out", "error"})) << "after signal " << signal;
     EXPECT_EQ(read("error"), "");
+    const json document = json::parse(read("out.json"));
+    const std::string frames = std::to_string(document.at("frames").size());
+    EXPECT_FALSE(document.at("complete"));
+    EXPECT_FALSE(document.at("summary").at("holds"));
+    EXPECT_EQ(document.at("summary").at("failed"), 0) << "what is not reached is no failure";
+    EXPECT_GT(document.at("verdicts").size(), 10u);
+    EXPECT_THAT(document.at("not_reached").get<std::vector<std::string>>(), testing::Contains("components at the end"));
+    EXPECT_TRUE(has_printed("it was stopped after " + frames + " of 94 frames")) << read("out");
+    EXPECT_FALSE(has_printed("FAILS") || has_printed("verything holds")) << read("out");
+    EXPECT_NE(read("out.xml").find("<error message=\"it was stopped after " + frames), std::string::npos);
+    EXPECT_TRUE(unfinished().empty());
   }
+  const Outcome judged = cutproof("check seen --check topology");
+  EXPECT_EQ(judged.status, 1);
+  EXPECT_NE(judged.output.find("FAILS: the run is whole"), std::string::npos) << judged.output;
+}
+
+// The first one waits for the end of a frame, which is far.
+TEST_F(Interrupted, ASecondSignalEndsARunAtOnceAndLeavesNothing) {
+  start("run " + scene("small_block") +
+        " --record seen --json out.json --set step.substeps=100000 --set step.iterations=1000");
+  wait_until([&] { return unfinished().size() == 4 && has_printed("long work"); });
+  send(SIGINT);
+  EXPECT_EQ(end(SIGTERM), 128 + SIGTERM);
+  EXPECT_EQ(listing(), (std::set<std::string>{"out", "error"}));
 }
 
 TEST_F(Interrupted, WhatAKilledRecordingLeftIsGoneAfterTheNextOutputThere) {

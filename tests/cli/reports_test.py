@@ -24,10 +24,12 @@ class Program:
     def __init__(self, program, folder):
         self.program, self.folder = program, pathlib.Path(folder)
 
-    def run(self, *arguments, github=False):
-        environment = {name: value for name, value in os.environ.items() if name not in ("GITHUB_ACTIONS",)}
+    def run(self, *arguments, github=False, step_summary=None):
+        environment = {name: value for name, value in os.environ.items() if name not in ("GITHUB_ACTIONS", "GITHUB_STEP_SUMMARY")}
         if github:
             environment["GITHUB_ACTIONS"] = "true"
+        if step_summary:
+            environment["GITHUB_STEP_SUMMARY"] = step_summary
         return subprocess.run([self.program, *arguments], cwd=self.folder, env=environment, capture_output=True,
                               text=True)
 
@@ -77,21 +79,25 @@ def runs(program, sources):
                   for p in json.loads((program.folder / "good.out").read_text())["properties"]}
     cases = program.junit(0, "run", good, "--check")
     expect(properties.keys() <= cases.keys(), f"no case for {properties.keys() - cases.keys()}")
-    expect("expected components at the end after skin" in cases, f"what the scene expects is no case: {list(cases)}")
+    expect("expected components at the end" in cases, f"what the scene expects is no case: {list(cases)}")
     vacuous = {name for name, p in properties.items() if p["judged"] == 0}
     skipped = {name for name, case in cases.items() if case.find("skipped") is not None}
     expect(vacuous and vacuous == skipped, f"vacuous {vacuous}, skipped {skipped}")
-    expect(all(len(of(cases[name], "skipped")[0]) > len("vacuous: ") for name in skipped), "skipped without a reason")
+    expect(all(len(of(cases[name], "skipped")[0]) > len("nothing to look at: ") for name in skipped), "skipped without a reason")
+    expect(all(of(cases[name], "skipped")[0].startswith("nothing to look at: ") for name in skipped), "another reason")
+    expect(float(cases["admissible step after step"].get("time")) > 0, "judging has taken no time")
     expect(program.annotations(0, "run", good, "--check") == [], "annotations of what holds")
+    cases = program.junit(0, "run", scene("dots.json", name="a.b/c.d"), "--check")
+    expect({case.get("classname") for case in cases.values()} == {"cutproof.run.a_b/c_d"}, "dots in a class")
 
     # A run that fails, in a file whose name a shell has to be told.
     bad = scene("it's bad.json", expect={"components_at_end": 7})
     again = "cutproof run 'it'\\''s bad.json' --backend host --check"  # whose default is motion
     cases = program.junit(1, "run", bad, "--backend", "host", "--check")
-    message, text = of(cases["expected components at the end after skin"], "failure")
+    message, text = of(cases["expected components at the end"], "failure")
     expect(message and again in text and "1 of 1 verdicts fail" in text, f"no witness or no command: {message} {text}")
     expect([name for name, case in cases.items() if case.find("failure") is not None] ==
-           ["expected components at the end after skin"], "other cases fail as well")
+           ["expected components at the end"], "other cases fail as well")
     found = program.annotations(1, "run", bad, "--backend", "host", "--check")
     expect(len(found) == 1 and found[0].startswith("::error title=cutproof: expected components at the end::") and
            found[0].endswith("; see it again: " + again + " motion"), f"annotations: {found}")
@@ -120,14 +126,103 @@ def runs(program, sources):
         expect(done.returncode == 2 and word in done.stderr and "frame" not in done.stdout, f"{arguments}: {done}")
     expect(not (program.folder / "none.xml").exists(), "a report of nothing")
 
+    # The summary of a step, to which each command adds.
+    program.run("run", good, "--check", step_summary="summary.txt")
+    program.run("run", bad, "--check", step_summary="summary.txt")
+    summary = (program.folder / "summary.txt").read_text()
+    expect(summary.startswith("### cutproof run good.json "), summary)
+    expect(summary.count("### ") == 2 and ": holds\n" in summary and ": 1 failure\n" in summary and
+           "- **expected components at the end**: " in summary and "\n      cutproof run 'it'\\''s bad.json'" in summary,
+           summary)
+    done = program.run("run", good, "--check", step_summary="nowhere/summary.txt")
+    expect(done.returncode == 3 and "GITHUB_STEP_SUMMARY" in done.stderr, f"a summary that cannot be written: {done}")
+
     # The same of a recording.
     cases = program.junit(0, "check", "seen")
     expect(cases["coverage after skin"].get("classname") == "cutproof.check.small", "the class of check's cases")
     program.run("run", bad, "--record", "worse")
     cases = program.junit(1, "check", "worse")
-    expect("cutproof check worse" in of(cases["expected components at the end after skin"], "failure")[1], "no command")
+    expect("cutproof check worse" in of(cases["expected components at the end"], "failure")[1], "no command")
     found = program.annotations(1, "check", "worse")
     expect(len(found) == 1 and found[0].endswith("; see it again: cutproof check worse"), f"annotations: {found}")
+
+
+def baselines(program):
+    """What failed before does not count; what is new does, and what is slower does not."""
+    def scene(**expect_block):
+        (program.folder / "scene.json").write_text(json.dumps(SCENE | {"expect": expect_block}))
+
+    def document(name):
+        return json.loads((program.folder / name).read_text())
+
+    def run(status, *more):
+        done = program.run("run", "scene.json", "--check", *more)
+        expect(done.returncode == status, f"{more}: status {done.returncode}, not {status}: {done.stdout}{done.stderr}")
+        return done.stdout
+
+    beside = ("--baseline", "before.json", "--json", "now.json")
+    scene(components_at_end=7)
+    run(1, "--json", "before.json")
+    said = run(0, *beside)
+    expect("fails as in the baseline: expected components at the end (1 verdict, 1 in the baseline)" in
+           " ".join(said.split()) and said.splitlines()[-1] == "beside before.json: nothing new fails.", said)
+    now = document("now.json")
+    expect(now["summary"]["holds"] is False and now["baseline"]["new"] == [] and
+           [one["name"] for one in now["baseline"]["known"]] == ["expected components at the end"], f"{now['baseline']}")
+    cases = program.junit(0, "run", "scene.json", "--check", "--baseline", "before.json")
+    expect(of(cases["expected components at the end"], "skipped")[0].startswith("fails as in the baseline: "), "JUnit")
+    found = program.annotations(0, "run", "scene.json", "--check", "--baseline", "before.json")
+    expect(found == ["::warning title=cutproof: fails as in the baseline::expected components at the end"], f"{found}")
+
+    scene(components_at_end=7, clusters=[1000, 1000])
+    said = run(1, *beside)
+    expect("new since the baseline: expected clusters" in said and said.splitlines()[-1].endswith("something new fails."),
+           said)
+    scene(components_at_end=1)
+    said = run(0, *beside)
+    expect("mended since the baseline: expected components at the end" in said, said)
+    expect(document("now.json")["baseline"]["mended"] == ["expected components at the end"], "not mended")
+    # A run that stops before says nothing of what failed then.
+    said = run(0, *beside, "--frames", "1")
+    expect(document("now.json")["baseline"]["not_judged"] == ["expected components at the end"] and "mended" not in said,
+           said)
+
+    # Slower by the times of the baseline, and never a failure.
+    fast = document("before.json")
+    for frame in fast["frames"]:
+        frame["seconds"] = {stage: seconds / 1000 for stage, seconds in frame["seconds"].items()}
+    (program.folder / "fast.json").write_text(json.dumps(fast))
+    said = run(0, "--baseline", "fast.json", "--json", "now.json")
+    expect("slower than in the baseline: " in said, said)
+    slower = document("now.json")["baseline"]["slower"]
+    expect(slower and all(one["seconds_per_frame"] > 100 * one["seconds_per_frame_then"] for one in slower), f"{slower}")
+
+    # That nothing was judged is never known; a run of nothing has no frames.
+    (program.folder / "scene.json").write_text(json.dumps(SCENE | {"frame": {"count": 0}}))
+    if program.run("run", "scene.json", "--check", "--json", "empty.json").returncode == 1:
+        said = run(1, "--baseline", "empty.json")
+        expect("new since the baseline: something was judged" in said, said)
+    else:
+        expect(False, "a run of nothing holds")
+
+    # A recording beside the run that it is of.
+    scene(components_at_end=7)
+    program.run("run", "scene.json", "--record", "seen")
+    done = program.run("check", "seen", "--baseline", "before.json")
+    expect(done.returncode == 0 and "nothing new fails" in done.stdout, f"{done}")
+
+    # Another scene, no result, no file, nothing judged.
+    (program.folder / "other.json").write_text(json.dumps(fast | {"scene": "another"}))
+    (program.folder / "unjudged.json").write_text(json.dumps(fast | {"checked": False}))
+    (program.folder / "broken.json").write_text(json.dumps(fast | {"verdicts": 3}))
+    for file, words in (("other.json", ("other.json", "scene", "another")), ("scene.json", ("scene.json", "format")),
+                        ("none.json", ("none.json",)), ("unjudged.json", ("checked", "nothing was judged")),
+                        ("broken.json", ("verdicts", "no list"))):
+        done = program.run("run", "scene.json", "--check", "--baseline", file, "--json", "refused.json")
+        expect(done.returncode == 2 and all(word in done.stderr for word in words), f"{file}: {done}")
+        expect(not (program.folder / "refused.json").exists(), f"{file}: something was written")
+    done = program.run("run", "scene.json", "--baseline", "before.json")
+    expect(done.returncode == 2 and "--baseline" in done.stderr, f"nothing is judged: {done}")
 
 
 def campaigns(program):
@@ -216,6 +311,7 @@ def main():
     program, sources = sys.argv[1], pathlib.Path(sys.argv[2])
     with tempfile.TemporaryDirectory() as folder:
         runs(Program(program, folder), sources)
+        baselines(Program(program, folder))
         campaigns(Program(program, folder))
         vectors(Program(program, folder))
         replays(Program(program, folder), sources)

@@ -8,6 +8,7 @@
 
 #include "cli/findings.h"
 #include "cli/terminal.h"
+#include "model/io/verdict_json.h"
 
 namespace cutproof::cli::shown_verdicts_test {
 namespace {
@@ -121,8 +122,57 @@ TEST(JunitCases, AreSkippedWhereNoVerdictLookedAtAnything) {
   Verdict looked = vacuous;
   looked.checked = 1;
   EXPECT_EQ(cases_of({vacuous, vacuous}, judging).at(0).outcome, io::JunitOutcome::skipped);
-  EXPECT_EQ(cases_of({vacuous, vacuous}, judging).at(0).message, "vacuous: no blade");
+  EXPECT_EQ(cases_of({vacuous, vacuous}, judging).at(0).message, "nothing to look at: no blade");
   EXPECT_EQ(cases_of({vacuous, looked}, judging).at(0).outcome, io::JunitOutcome::passed);
+}
+
+// What is asked of the judging itself is no property, and no bound of it is one to come near to.
+TEST(ShownVerdicts, CountNoPropertyThatOnlySaysThatEnoughWasJudged) {
+  Verdict property = failing_verdict("momentum", Stage::step, 0, ""), gate = property, whole = property;
+  gate.property = "something was judged";
+  whole.property = "the run is whole";
+  for (Verdict* const one : {&property, &gate, &whole}) {
+    one->holds = true;
+    one->measured = one == &property ? 0.25 : 1;
+    one->bound = 1;
+  }
+  const std::string text = printed({property, gate, whole});
+  EXPECT_NE(text.find("1 property holds, in 1 verdict; the nearest to its bound: momentum after step, at 0.25 of it."),
+            std::string::npos)
+      << text;
+  gate.holds = false;
+  gate.witness.text = "nothing";
+  EXPECT_NE(printed({property, gate}).find("FAILS: something was judged, in frame 0"), std::string::npos);
+}
+
+TEST(ShownVerdicts, SayOneOnlyOfWhatIsExactlyAtItsBound) {
+  EXPECT_EQ(io::share_of(0.9996), "0.99");
+  EXPECT_EQ(io::share_of(1), "1");
+  EXPECT_EQ(io::share_of(1.0004), "1.01");
+  EXPECT_EQ(io::share_of(0.376), "0.38");
+  EXPECT_EQ(io::share_of(123), "1.2e+02");
+}
+
+TEST(JunitCases, HaveTheTimeThatTheirVerdictsTookAndClassesWithoutTheDotsOfPaths) {
+  Verdict one = failing_verdict("coverage", Stage::split, 3, "an edge"), another = one;
+  one.took.seconds = 0.25;
+  another.took.seconds = 0.5;
+  const auto cases = cases_of({one, another}, {"cutproof run", class_of("run", "./a.b/c"), "cutproof run it"});
+  ASSERT_EQ(cases.size(), 1U);
+  EXPECT_EQ(cases[0].seconds, 0.75);
+  EXPECT_EQ(cases[0].class_name, "cutproof.run._/a_b/c");
+  EXPECT_EQ(class_of("kick"), "cutproof.kick");
+}
+
+TEST(Failures, AreOneForEachProperty) {
+  const Judging judging{"cutproof check", "cutproof.check", "cutproof check it"};
+  const std::vector<Failure> failures = failures_of(
+      {failing_verdict("coverage", Stage::split, 3, "first"), failing_verdict("finite", Stage::skin, 3, "b"),
+       failing_verdict("coverage", Stage::skin, 4, "later")},
+      judging);
+  ASSERT_EQ(failures.size(), 2U);
+  EXPECT_EQ(failures[0].text, "first (the first of 2 verdicts that fail)");
+  EXPECT_EQ(failures[1].text, "b");
 }
 
 TEST(JunitCases, SkipEachStageThatWasLeftToTheReference) {
@@ -137,7 +187,8 @@ TEST(JunitCases, SkipEachStageThatWasLeftToTheReference) {
 TEST(JunitCases, OfACampaignNameEveryViolationAndTheWhole) {
   const Judging judging{"cutproof fuzz", "cutproof.fuzz", "cutproof fuzz it"};
   const auto property = [](const char* name, int64_t judged, int64_t failed) {
-    return nlohmann::json{{"property", name}, {"stage", "step"}, {"judged", judged}, {"failed", failed}};
+    return nlohmann::json{
+        {"property", name}, {"stage", "step"}, {"judged", judged}, {"failed", failed}, {"seconds", 0.25}};
   };
   const nlohmann::json violation = {
       {"index", 7},
@@ -161,6 +212,7 @@ TEST(JunitCases, OfACampaignNameEveryViolationAndTheWhole) {
   EXPECT_NE(by_name.at("motion after step").text.find("case 7: as it is shown"), std::string::npos);
   EXPECT_NE(by_name.at("motion after step").text.find("cutproof replay found.json"), std::string::npos);
   EXPECT_EQ(by_name.at("finite after step").outcome, io::JunitOutcome::passed);
+  EXPECT_EQ(by_name.at("finite after step").seconds, 0.25);
   EXPECT_EQ(by_name.at("no pass after step").outcome, io::JunitOutcome::skipped);
   EXPECT_EQ(by_name.at("stage skin").outcome, io::JunitOutcome::skipped);
   EXPECT_EQ(by_name.at("enough was judged").outcome, io::JunitOutcome::passed) << "a property fails, and says so";

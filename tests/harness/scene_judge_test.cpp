@@ -324,6 +324,7 @@ TEST(PropertySummaries, JoinAsIfAllHadBeenAddedToOne) {
     one.measured = measured;
     one.bound = bound;
     one.checked = checked;
+    one.took.seconds = 0.25;
     return one;
   };
   const Verdict all[] = {verdict(1, 10, 3), verdict(4, 100, 1), verdict(7, 0, 2), verdict(9, 9, 0)};
@@ -340,6 +341,7 @@ TEST(PropertySummaries, JoinAsIfAllHadBeenAddedToOne) {
     EXPECT_EQ(a.checked, 6);
     EXPECT_EQ(a.measured, 7) << "the one that looked at nothing does not count";
     EXPECT_EQ(a.of_bound, 0.1) << "of the least bound, not of the greatest measure";
+    EXPECT_EQ(a.seconds, 4 * 0.25);
   }
 }
 
