@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # A verb of cutproof in continuous integration: leaves results.json, junit.xml and page.html in a folder, and ends as the
 # program does (0: everything holds, 1: something fails, 2: bad input, 3: the machine failed).
-# Usage: judge.sh PACKAGE FOLDER VERB ARGUMENTS...     e.g. judge.sh cutproof-0.1.0-linux-x86_64.tar.gz found run cut.json --check
+# Usage: judge.sh PACKAGE FOLDER VERB ARGUMENTS...     e.g. judge.sh cutproof-0.1.0-linux-x86_64.tar.gz found check RUN
 #   PACKAGE   the .tar.gz of ci/package.sh, which is unpacked into FOLDER/program unless it is there; "-": the program that
 #             is installed
 #   VERB      run, check, judge or fuzz, which write all three
@@ -23,7 +23,7 @@ if [ "$package" != - ]; then
     rm -rf "$folder/program" "$folder/program.new"
     mkdir -p "$folder/program.new"
     tar -xmzf "$package" -C "$folder/program.new" --strip-components=1 2>/dev/null ||
-      { rm -rf "$folder/program.new"; refuse "\"$package\" is no whole .tar.gz: copy it again, or name that of ci/package.sh"; }
+      { rm -rf "$folder/program.new"; refuse "\"$package\" is no whole .tar.gz of ci/package.sh: copy it again"; }
     mv "$folder/program.new" "$folder/program"
   fi
 fi

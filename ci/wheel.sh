@@ -36,7 +36,9 @@ def platform(programs, machine):
 def main(folder):
     archives = list(folder.glob("cutproof-*.tar.gz"))
     if len(archives) != 1:
-        sys.exit(f"ci/wheel.sh: {folder}: There are {len(archives)} archives, and one is to be packed. Make it by ci/package.sh.")
+        print(f"ci/wheel.sh: {folder}: There are {len(archives)} archives, and one is to be packed: run ci/package.sh",
+              file=sys.stderr)
+        sys.exit(2)
     version, machine = re.fullmatch(r"cutproof-([\d.]+)-linux-(\w+)\.tar\.gz", archives[0].name).groups()
     summary = re.search(r'DESCRIPTION_SUMMARY "(.+)"', pathlib.Path("cmake/Package.cmake").read_text()).group(1)
     with tempfile.TemporaryDirectory() as unpacked:

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Makes packages as ci/package.sh does, and asks of them what it says: glibc 2.34 and nothing else, wherever they lie.
 
-Then runs the program of the archive and of the wheel, and what the examples for CI systems call. Exit status: 0 all is as it
-should be, 1 something is not, 77 this is no Debian 12.
+Then runs the program of the archive and of the wheel, and what the examples for CI systems call. Exit status: 0 all is as
+it should be, 1 something is not, 77 this is no Debian 12.
 """
 import argparse
 import os
@@ -72,6 +72,8 @@ def judge_lying_wheel(top, options):
     made = must([options.source / "ci/wheel.sh", folder])
     expect("py3-none-linux_" in made, f"a wheel that needs libstdc++ is called {made}")
     shutil.rmtree(folder)
+    done = run([options.source / "ci/wheel.sh", options.work / "unpacked"])
+    expect(done.returncode == 2 and "0 archives" in done.stdout, f"ci/wheel.sh packs nothing: {done.stdout}")
 
 
 def judge_examples(archive, options):
