@@ -126,7 +126,7 @@ ordered_json schema_of(T& value, const SceneField& f) {
     return {{"$ref", std::string("#/definitions/") + kShape}};
   } else if constexpr (std::is_same_v<T, Vec3>) {
     return {{"type", "array"}, {"minItems", 3}, {"maxItems", 3}, {"items", number_schema("number", f)}};
-  } else if constexpr (std::is_same_v<T, Range>) {
+  } else if constexpr (std::is_same_v<T, cutproof::Range>) {
     const ordered_json number = number_schema("number", f);
     ordered_json range = {{"type", "object"}, {"minProperties", 1}, {"additionalProperties", false}};
     range["properties"] = {{"at_least", number}, {"at_most", number}};
