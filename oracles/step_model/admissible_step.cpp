@@ -34,7 +34,7 @@ constexpr int64_t kLongRun = 2'000'000;
 // Beyond this the way from a rounding to what it does is no longer straight [h].
 constexpr double kSmall = 1e-3;
 // Beyond this share of kSurely what disturbed runs allow is asked for, to be told.
-constexpr double kNearly = 0.5;
+constexpr double kNearly = 0.9;
 // Two rotations are not farther apart, but for the rounding of their entries (apart).
 constexpr double kAnyRotation = 2 + 1e-4;
 

@@ -43,22 +43,6 @@ TEST(AdmissibleStep, IsTheSameHoweverManyRunsGoAtTheSameTime) {
   }
 }
 
-// What just holds within single roundings is told beside what disturbed runs allow, and no bound of anybody else
-// follows.
-TEST(AdmissibleStep, DoesNotReadAsNearlyFailedWhereAWiderQuestionIsLeft) {
-  StepScene scene = pressed_block();
-  const auto found = [&] { return nearest_admissible_step(scene.setup, scene.before, scene.after); };
-  const AdmissibleStep right = found();
-  const double surely = right.position_bound[kInside];
-  scene.after.x[kInside].y += 0.9 * surely * kSpacing;
-  const AdmissibleStep off = found();
-  EXPECT_TRUE(off.holds);
-  EXPECT_GT(off.measured, 0.5 * surely);
-  EXPECT_LT(off.measured, 0.7 * off.bound)
-      << "8 times the farthest of eight runs is more than twice a sum of roundings";
-  EXPECT_EQ(off.position_bound, right.position_bound);
-}
-
 TEST(AdmissibleStep, IsTheReferencesWithEveryCauseAtWork) {
   for (const Solver solver : {Solver::implicit, Solver::published}) {
     for (const Acceleration acceleration : {Acceleration::none, Acceleration::chebyshev}) {
