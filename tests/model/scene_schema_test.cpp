@@ -64,9 +64,8 @@ std::vector<json> bases() {
   for (const std::string_view kind : kShapeNames) {
     Scene scene;
     scene.body.shape.emplace().kind = *choice_named<Shape::Kind>(kind);
-    scene.body.particles = 1000;
     scene.body.shape->parts.resize(1);
-    add("body", json::parse(write_scene(scene))["body"]);
+    add("body", {{"shape", json::parse(write_scene(scene))["body"]["shape"]}, {"particles", 1000}});
   }
   add("body", {{"mesh", {{"file", "a.stl"}, {"unit", 1}, {"repair", true}, {"repair_change", 0}}}, {"spacing", 1}});
   add("step", {{"solver", "published"}, {"acceleration", "none"}, {"retardation", 0}});
@@ -79,9 +78,9 @@ std::vector<json> bases() {
 
 // Every way to put another value in the place of one of a tree, to leave one out, and to add a field.
 std::vector<json> damaged(const json& base) {
-  const std::vector<json> values = json::parse(R"([null, true, "", "text", "published", "geometric", "none", "arc",
-    "union", "torus", "both", -1, 0, 0.5, 1, 3, 1e6, 1e18, 1e300, [], {}, [0, 0, 0], [1, 2, 3], [[0, 0, 0]],
-    [[0, 0, 0], [1, 0, 0]], [[0, 0, 0], [0, 0, 0], [0, 0, 0]]])");
+  const std::vector<json> values = json::parse(R"([null, true, "", "published", "geometric", "none", "arc", "union",
+    -1, 0, 0.5, 1, 1e6, 1e18, [], {}, [0, 0, 0], [1, 2, 3], [[0, 0, 0]], [[0, 0, 0], [1, 0, 0]],
+    [[0, 0, 0], [0, 0, 0], [0, 0, 0]]])");
   std::vector<json> found;
   const std::function<void(const json::json_pointer&)> visit = [&](const json::json_pointer& place) {
     const json& here = base.at(place);
@@ -143,7 +142,7 @@ TEST(SceneSchema, IsWrittenForTheValidator) {
     documents.push_back({{"scene", scene}, {"refusal", refusal(scene)}});
     read += documents.back()["refusal"] == "";
   }
-  EXPECT_GT(read, 500);
+  EXPECT_GT(read, 300);
   EXPECT_GT(std::ssize(documents) - read, 3000);
   if (const char* folder = std::getenv("CUTPROOF_SCHEMA_FOLDER")) {
     std::filesystem::create_directories(folder);
