@@ -32,6 +32,7 @@
 #include "model/io/verdict_json.h"
 #include "model/left_stages.h"
 #include "model/printable.h"
+#include "oracles/property_count.h"
 #include "property_tests/campaign.h"
 #include "property_tests/campaign_report.h"
 #include "property_tests/recorded_case.h"
@@ -136,7 +137,8 @@ void print_properties(const json& properties) {
     } else if (each.at("judged") > 0) {
       ++holds;
       judged += each.at("judged").get<int64_t>();
-      if (has_share && (nearest == nullptr || each.at("of_bound") > nearest->at("of_bound"))) nearest = &each;
+      const bool tells = has_share && !oracles::asks_wider(each.at("property").get<std::string>());
+      if (tells && (nearest == nullptr || each.at("of_bound") > nearest->at("of_bound"))) nearest = &each;
     }
     doubtful += each.at("undecided").get<int64_t>();
   }

@@ -183,7 +183,8 @@ void print_holding(const std::vector<Row>& rows, const Shown& shown) {
       continue;
     }
     verdicts += row.looked;
-    if (row.of_bound > 0 && (nearest == nullptr || row.of_bound > nearest->of_bound)) nearest = &row;
+    const bool tells = row.of_bound > 0 && !oracles::asks_wider(row.any->property);
+    if (tells && (nearest == nullptr || row.of_bound > nearest->of_bound)) nearest = &row;
   }
   if (!expected.empty()) say("\n{}: {}.\n", holding("As the scene expects"), listed(expected));
   if (right == 0) return;

@@ -18,6 +18,9 @@ inline bool is_of_the_judging(std::string_view property) {
   }
   return false;
 }
+// Whether a wider question is asked beyond the bound of this property, which nearly all then pass: a share of its bound
+// does not tell how nearly a verdict failed (tolerances.md, The step again).
+inline bool asks_wider(std::string_view property) { return property == "admissible step"; }
 // Whether a verdict of this name is on a state or a stage: then the stage after which it was judged is told.
 inline bool is_of_a_moment(std::string_view property) {
   return !property.starts_with(kExpectation) && !is_of_the_judging(property);

@@ -8,6 +8,7 @@
 #include "model/error.h"
 #include "model/io/json_number.h"
 #include "model/io/json_text.h"
+#include "oracles/property_count.h"
 #include "report/assets.h"
 #include "report/coding.h"
 #include "report/document_page.h"
@@ -34,13 +35,21 @@ json finding_json(const Finding& finding, const Marks& marks) {
 }
 
 json row_json(const PropertyRow& row) {
-  return {{"property", row.property},   {"stage", name_of(row.stage)},
-          {"unit", row.unit},           {"source", row.bound_source},
-          {"judged", row.judged},       {"checked", row.checked},
-          {"failed", row.failed},       {"expected", row.expected},
-          {"undecided", row.undecided}, {"vacuous", row.vacuous},
-          {"frame", row.frame},         {"measured", row.measured},
-          {"bound", row.bound},         {"ofBound", json_number(row.of_bound)}};
+  return {{"property", row.property},
+          {"stage", name_of(row.stage)},
+          {"unit", row.unit},
+          {"source", row.bound_source},
+          {"judged", row.judged},
+          {"checked", row.checked},
+          {"failed", row.failed},
+          {"expected", row.expected},
+          {"undecided", row.undecided},
+          {"vacuous", row.vacuous},
+          {"frame", row.frame},
+          {"measured", row.measured},
+          {"bound", row.bound},
+          {"ofBound", json_number(row.of_bound)},
+          {"asksWider", oracles::asks_wider(row.property)}};
 }
 
 json series_json(const std::vector<Series>& all) {

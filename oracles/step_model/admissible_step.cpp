@@ -33,8 +33,6 @@ constexpr double kBeyondRuns = 8;
 constexpr int64_t kLongRun = 2'000'000;
 // Beyond this the way from a rounding to what it does is no longer straight [h].
 constexpr double kSmall = 1e-3;
-// Beyond this share of kSurely what disturbed runs allow is asked for, to be told.
-constexpr double kNearly = 0.9;
 // Two rotations are not farther apart, but for the rounding of their entries (apart).
 constexpr double kAnyRotation = 2 + 1e-4;
 
@@ -110,7 +108,6 @@ class Judge {
   AdmissibleStep judge() {
     begin();
     compare();
-    if (holds() && worst_ > kNearly) look_wider();
     for (const uint64_t runs : {kDisturbedRuns, kMostDisturbedRuns}) {
       if (holds()) break;
       look_closer(runs);
@@ -283,19 +280,6 @@ class Judge {
     if (follow_rotations()) return look_closer(runs);
     let_go();
     ask_bluntly();
-  }
-
-  // What holds within the first bounds is told beside the wider ones that the runs would have allowed. Nothing else
-  // hangs on these.
-  void look_wider() {
-    const Bounds first = bounds_;
-    bounds_.combine(spread_of(kDisturbedRuns, {}).off,
-                    [](double bound, double farthest) { return std::max(bound, kBeyondRuns * farthest); });
-    for (std::size_t c = 0; c < reach_.size(); ++c) {
-      if (is_open(c)) bounds_.rotation[c] = first.rotation[c];
-    }
-    compare();
-    bounds_ = first;
   }
 
   // A decision that rounding may have taken the other way changes where all that is coupled with the particle ends.

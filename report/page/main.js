@@ -306,7 +306,7 @@ function findings() {
   byId('findings-title').textContent = failing.length ? 'What fails' : isPreview ? 'Nothing has run' : !data.checked ? 'Nothing was judged' : data.holds ? 'Nothing fails' : 'It does not hold';
   if (!data.checked) section.append(element('p', { text: isPreview ? 'This page shows what the scene says. This command runs it and judges what happens:' : 'This page shows what happened. Whether it is right, this command judges:' }));
   if (data.checked && data.holds && !failing.length) {
-    const near = data.rows.filter((row) => row.judged > 0 && row.ofBound !== null).sort((a, b) => b.ofBound - a.ofBound)[0];
+    const near = data.rows.filter((row) => row.judged > 0 && row.ofBound !== null && !row.asksWider).sort((a, b) => b.ofBound - a.ofBound)[0];
     section.append(element('p', { text: `All that was judged holds${data.findings.length ? ', but for what the scene expects to fail' : ''}.${near ? ` The nearest to its bound is ${near.property}${data.foreign ? '' : ` after ${near.stage}`}, at ${figure(near.ofBound)} of the bound, in frame ${near.frame}.` : ''}` }));
   }
   const apart = comparison && comparisonCard(comparison, data.foreign, showApart);

@@ -22,6 +22,7 @@ export function command(text) {
 // Measured over bound: the bar ends at the bound, and what goes beyond is drawn beyond it.
 function bar(row, fails) {
   if (row.ofBound === null) return element('span', { class: 'muted', text: row.bound === '0' && !fails ? 'exact' : '' });
+  if (row.asksWider && !fails) return element('span', { class: 'muted', text: 'within the first of its bounds' });
   const share = Math.min(row.ofBound, 1.25);
   const filled = element('span', { class: fails ? 'filled bad' : 'filled' });
   filled.style.width = `${(100 * share) / 1.25}%`;
