@@ -41,7 +41,7 @@ for name, spoil, verdict in (
         ("heavier", ('dt * step["gravity"]', '1.01 * dt * step["gravity"]'), "linear momentum after step"),
         ("not_a_number", ("v = v * np.exp", "v = np.nan * v * np.exp"), "finite after step"),
         ("a_frame_short", ('enumerate(index["setup/substep_length"][:])', 'enumerate(index["setup/substep_length"][:-1])'),
-         "the run is whole after skin")):
+         "the run is whole")):
     status, output = run(name, spoil)
     assert status == 1 and f"FAILS: {verdict}, " in output, f"{name}: status {status}, not '{verdict}':\n{output}"
 # Rows that are not there are a damaged file, not a verdict.

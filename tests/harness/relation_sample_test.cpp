@@ -33,6 +33,7 @@ struct Asked {
 Asked ask(const RecordedScene& recorded, std::unique_ptr<Backend> second) {
   harness::RelationSample relations(recorded.built.setup, std::move(second));
   for (const harness::Moment& moment : recorded.trace.moments) relations.see(moment);
+  relations.wait();
   return {relations.take_verdicts(), relations.notes()};
 }
 

@@ -105,7 +105,7 @@ TEST(Results, OfStatesKicksAndRelationsSayWhatWasJudgedAndWhereToLook) {
                                     {"body", {{"particles", 6}, {"pieces", 2}}},
                                     {"not_judged", {{{"property", "motion"}, {"why", "one state"}}}}});
   EXPECT_EQ(summary_sentence(state),
-            "cutproof judged the state a.npz: all 2 properties that were judged hold, in 2 verdicts. Its tissue is 2 "
+            "cutproof judged the state a.npz: the one property that was judged holds, in 2 verdicts. Its tissue is 2 "
             "pieces.");
   EXPECT_EQ(state.rows.back().vacuous, "one state");
   for (const PropertyRow& row : state.rows) EXPECT_EQ(row.of_bound, std::nullopt) << row.property;
