@@ -40,6 +40,8 @@ struct SinceBaseline {
   std::vector<std::string> not_judged;  // failed, and were not judged, or not as far
   std::vector<Slower> slower;           // by a quarter at least: told, and never a failure
 
+  // Whether all that fails is known; nothing excuses what failed for another reason than a verdict.
+  bool excuses() const { return fresh.empty() && !known.empty(); }
   bool is_known(const std::string& name) const;
   bool is_known(const Verdict& verdict, bool in_stages) const;
 };

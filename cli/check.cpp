@@ -96,7 +96,7 @@ int check_recording(const CheckOptions& options) {
                     judge.left_to_reference()};
   if (since) add_baseline_to(said, *since);
   tell_github(said);
-  return judge.holds() || (since && since->fresh.empty()) ? 0 : 1;
+  return judge.holds() || (since && since->excuses()) ? 0 : 1;
 }
 
 int check(const CheckOptions& options) {

@@ -115,7 +115,7 @@ int check_run(io::RunSegments segments, const std::string& file, const StateRepo
   Shown shown{reports.again};
   shown.in_stages = false;
   show_judged(judged.verdicts, judged.not_judged, judged.notes, shown, judging, reports, {}, since ? &*since : nullptr);
-  return judged.holds() || (since && since->fresh.empty()) ? 0 : 1;
+  return judged.holds() || (since && since->excuses()) ? 0 : 1;
 }
 
 }  // namespace cutproof::cli

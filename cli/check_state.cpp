@@ -124,7 +124,7 @@ int check_state(const io::ArrayFile& contents, const std::string& file, const St
   Shown shown{reports.again};
   shown.in_frames = false;
   show_judged(judged.verdicts, judged.not_judged, judged.notes, shown, judging, reports, {}, since ? &*since : nullptr);
-  return judged.holds() || (since && since->fresh.empty()) ? 0 : 1;
+  return judged.holds() || (since && since->excuses()) ? 0 : 1;
 }
 
 }  // namespace cutproof::cli

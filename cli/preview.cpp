@@ -50,7 +50,8 @@ void write_preview(const std::string& path, const Scene& scene, const fixtures::
   results.command = "preview";
   results.scene = scene.name;
   results.notes = built.notes;
-  io::write_text(path, report::page(source, results, again + " --check", made_by(again + " --preview " + quoted(path))));
+  io::write_text(path,
+                 report::page(source, results, again + " --check", made_by(again + " --preview " + quoted(path))));
 }
 
 }  // namespace cutproof::cli

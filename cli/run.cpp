@@ -414,7 +414,7 @@ int run(const RunOptions& options) {
   if (since != nullptr) print_since(*since);
   if (!stopped.empty()) insist("{}: {}\n", undecided("INCOMPLETE"), stopped);
   tell_github_of_run(session, judging, stopped, since);
-  return session.holds() || (since != nullptr && since->fresh.empty() && stopped.empty()) ? 0 : 1;
+  return session.holds() || (since != nullptr && since->excuses() && stopped.empty()) ? 0 : 1;
 }
 
 }  // namespace

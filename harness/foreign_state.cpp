@@ -460,11 +460,11 @@ class Reader {
 
   NamedArrays in_;
   ForeignState out_;
-  std::vector<Vec3> rest_;                          // as given, or as the nodes say; empty: neither
+  std::vector<Vec3> rest_;  // as given, or as the nodes say; empty: neither
   std::vector<std::pair<int32_t, int32_t>> edges_;
-  std::string why_no_grid_;                         // a grid was given, and its body has none
-  std::vector<std::string> widened_;                // arrays of float64 that hold single precision
-  Vec3 origin_;                                     // of the body's frame, in the file's [m]
+  std::string why_no_grid_;           // a grid was given, and its body has none
+  std::vector<std::string> widened_;  // arrays of float64 that hold single precision
+  Vec3 origin_;                       // of the body's frame, in the file's [m]
 };
 
 }  // namespace

@@ -211,15 +211,21 @@ std::vector<Verdict> judge_runs_beside(const Question& question, const Arrays& a
   if ((promises & (kPromisesNoGhostForce | kPromisesMirror)) == 0) return {};
   const RunFiles run = run_files(question, answers, precision);
   if (!run.problem.empty()) return {};  // a verdict by itself
-  std::vector<Verdict> verdicts;
+  Apart apart;
   try {
-    const Apart apart = apart_of(run.frames);
-    if (apart.piece.empty()) return {};  // likewise
-    if ((promises & kPromisesNoGhostForce) != 0) verdicts = judge_kicked(question, run.frames, apart, precision, ask);
-    if ((promises & kPromisesMirror) != 0)
-      verdicts.push_back(judge_mirrored(question, run.frames, apart, precision, ask));
+    apart = apart_of(run.frames);
   } catch (const InputError&) {
     return {};  // said of the run
+  }
+  if (apart.piece.empty()) return {};  // likewise
+  std::vector<Verdict> verdicts;
+  if ((promises & kPromisesNoGhostForce) != 0) verdicts = judge_kicked(question, run.frames, apart, precision, ask);
+  if ((promises & kPromisesMirror) != 0) {
+    try {
+      verdicts.push_back(judge_mirrored(question, run.frames, apart, precision, ask));
+    } catch (const InputError& error) {
+      verdicts.push_back(unreadable(kMirrored, fmt::format("mirrored, {}", error.what())));
+    }
   }
   return verdicts;
 }

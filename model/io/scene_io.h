@@ -28,8 +28,8 @@ std::string source_of_field(const std::string& field, const std::string& name, c
 std::string write_scene(const Scene& scene);
 // docs/reference/scene.md: every field with type, unit, default, bounds and meaning.
 std::string scene_reference();
-// fixtures/scene.schema.json: the same as JSON Schema (draft 7). A scene that is read is valid; what is valid is read, but
-// for conditions that no schema can say.
+// fixtures/scene.schema.json: the same as JSON Schema (draft 7). A scene that is read is valid; what is valid is read,
+// but for conditions that no schema can say.
 std::string scene_schema();
 
 }  // namespace cutproof::io

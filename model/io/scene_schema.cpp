@@ -71,8 +71,7 @@ void add_conditions(const Shape& shape, ordered_json& schema) {
   schema["required"].push_back("parts");
 }
 
-// --- Fields
-// -----------------------------------------------------------------------------------------------------------
+// --- Fields ---------------------------------------------------------------------------------------------------------
 
 constexpr const char* kShape = "shape";  // shapes contain shapes, so theirs has a name
 

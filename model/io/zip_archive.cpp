@@ -218,8 +218,7 @@ void ZipReader::require_whole() const {
   if (sum_ != entry_.sum) throw DamagedArchive("it does not have the check sum that the directory says");
 }
 
-// --- Writing
-// ----------------------------------------------------------------------------------------------------------
+// --- Writing --------------------------------------------------------------------------------------------------------
 
 namespace {
 

@@ -202,6 +202,34 @@ TEST(Dissect, AnswersThatContradictThemselvesAreRefused) {
   EXPECT_EQ(dissect().difference(question, negative.answers, Changed(question).answers), "");
 }
 
+TEST(Dissect, AMirroredRunThatCannotBeReadFails) {
+  PluginInfo plugin = with_limits("");
+  plugin.promises = "mirror";
+  Guest guest({PLUGIN_springs, "right", 20});
+  bool is_spoilt = false;
+  const AskBeside beside = [&](const Question& next) -> std::optional<Arrays> {
+    Arrays answers = ask(guest, dissect(), next, true).arrays;
+    if (is_spoilt)
+      *std::ranges::find(answers, "run/steps", &Array::name) = make_array("run/steps", {1}, std::vector<int64_t>{0});
+    return answers;
+  };
+  int64_t judged = 0;
+  for (int64_t index = 0; index < 10; ++index) {
+    const Question question = dissect().draw_for(3, index, plugin);
+    const Arrays answers = ask(guest, dissect(), question, true).arrays;
+    const auto verdicts = [&] { return dissect().judge_beside(question, answers, Precision::binary64, beside); };
+    is_spoilt = false;
+    const std::vector<Verdict> right = verdicts();
+    ASSERT_EQ(right.size(), 1U);
+    EXPECT_TRUE(right[0].holds) << right[0].witness.text;
+    if (right[0].checked == 0) continue;
+    ++judged;
+    is_spoilt = true;
+    EXPECT_FALSE(verdicts().at(0).holds);
+  }
+  EXPECT_GT(judged, 3);
+}
+
 TEST(Dissect, WhereNearlyEverythingIsRefusedNothingIsKnown) {
   EXPECT_EQ(judged("refuse", {.cases = 20}).untested(), "all 20 questions were refused");
   const KernelCampaign most = judged("refuse_most", {.cases = 100});
