@@ -69,7 +69,7 @@ void add_verdict(const Field& verdict, const Measured* known, std::vector<Row>& 
   const bool has_ratio = was_judged && (known == nullptr || known->count({property, stage}) != 0) &&
                          std::isfinite(measured) && std::isfinite(bound) && bound > 0 &&
                          // What demands at least its bound has no room to lose.
-                         (!holds || measured < bound) && property != "something was judged";
+                         (!holds || measured < bound) && !oracles::is_of_the_judging(property);
   const std::optional<double> of_bound = has_ratio ? std::optional(measured / bound) : std::nullopt;
   ++results.verdicts;
   if (shown.bound_source.empty()) shown.bound_source = source;
