@@ -32,7 +32,6 @@ struct CheckOptions {
   std::string recording;
   std::string depth{name_of(harness::Depth::motion)};
   std::string json, junit, report, baseline;
-  bool as_run = false;
   std::string again;  // the command line
 };
 
@@ -101,14 +100,9 @@ int check_recording(const CheckOptions& options) {
 
 int check(const CheckOptions& options) {
   const bool has_segments = io::RunSegments::has_segments(options.recording);
-  const bool is_recording = !has_segments && !io::is_array_file(options.recording);
-  if (is_recording && !options.as_run) return check_recording(options);
+  if (!has_segments && !io::is_array_file(options.recording)) return check_recording(options);
   depth_asked(options.depth);  // there is no motion to leave out, but a depth that is none is refused all the same
   const StateReports reports = {options.json, options.junit, options.report, options.again, options.baseline};
-  if (is_recording) {
-    open_recording(options.recording);  // one that contradicts itself is refused here, too
-    return check_run(io::RunSegments::of_recording(options.recording), options.recording, reports);
-  }
   if (has_segments) return check_run(io::RunSegments(options.recording), options.recording, reports);
   io::ArrayFile contents = io::read_array_file(options.recording);
   if (io::RunSegments::is_segment(contents)) {
@@ -116,7 +110,6 @@ int check(const CheckOptions& options) {
     only.front() = std::move(contents);
     return check_run(io::RunSegments(options.recording, std::move(only)), options.recording, reports);
   }
-  if (options.as_run) refuse("--as-run", "this file holds one state", "leave it out");
   return check_state(contents, options.recording, reports);
 }
 
@@ -130,8 +123,6 @@ void add_check(CLI::App& program, Work& work) {
       ->required()
       ->type_name("RECORDING");
   add_check_depth(*command, options->depth, "how much is judged");
-  command->add_flag("--as-run", options->as_run,
-                    "judge a recording as any simulator's run, whatever its method: without its scene");
   add_json(*command, options->json, "write verdicts and counts");
   add_junit(*command, options->junit);
   add_report_option(*command, options->report);

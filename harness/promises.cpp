@@ -14,7 +14,8 @@ namespace cutproof::harness {
 
 namespace {
 
-constexpr std::array kConnected = {std::string_view("cluster connectivity")};
+constexpr std::array kConnected = {std::string_view("cluster connectivity"),
+                                   std::string_view("no coupling across pieces")};
 constexpr std::array kCovered = {std::string_view("coverage")};
 constexpr std::array kCoupled = {std::string_view("component match"), std::string_view("isolation")};
 constexpr std::array kEdgesCovered = {std::string_view("edge cover")};
@@ -23,9 +24,10 @@ constexpr std::array kMaximal = {std::string_view("merge maximality")};
 constexpr std::array kTissueKept = {std::string_view("tissue kept")};
 constexpr std::array kRestFrames = {std::string_view("rest frames")};
 constexpr std::array kRotations = {std::string_view("rotation"), std::string_view("rotation match")};
-constexpr std::array kMomentum = {std::string_view("linear momentum"), std::string_view("component momentum")};
+constexpr std::array kMomentum = {std::string_view("linear momentum"), std::string_view("component momentum"),
+                                  std::string_view("centre of mass")};
 constexpr std::array kMotion = {std::string_view("motion"), std::string_view("admissible step"),
-                                std::string_view("step by iterates")};
+                                std::string_view("step by iterates"), std::string_view("no teleport")};
 constexpr std::array kBladeOut = {std::string_view("no pass")};
 constexpr std::array kSkin = {std::string_view("skin match"),     std::string_view("skin surface"),
                               std::string_view("skin vertices"),  std::string_view("skin shells"),

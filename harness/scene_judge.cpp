@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "model/left_stages.h"
 
@@ -16,12 +17,20 @@ SceneJudge::SceneJudge(const Setup& setup, const Expectations& expectations, std
       judge_(setup, std::move(backend), promises, Thorough::when_cut, depth),
       expectations_(setup, expectations, initial, extent) {
   judge_.begin(initial);
+  const bool any = setup.body.particle_count() > 0 && oracles::well_formed(setup, *initial).holds;
+  if (any && depth == Depth::motion) as_run_.emplace(setup, *initial);
 }
 
 void SceneJudge::see(const Moment& moment) {
   stages_.see(setup_, moment);
   judge_.see(moment);
   expectations_.see(moment);
+  if (!as_run_) return;
+  if (!moment.by_backend || !oracles::well_formed(setup_, *moment.after).holds) {
+    as_run_.reset();
+  } else if (moment.span.contains(Stage::skin)) {
+    as_run_->see(*moment.after);
+  }
 }
 
 void SceneJudge::stop() {
@@ -31,6 +40,13 @@ void SceneJudge::stop() {
 }
 
 void SceneJudge::finish() {
+  if (as_run_) {
+    std::set<std::string> asked = {"run well formed"};
+    for (const Verdict& verdict : judge_.verdicts()) asked.insert(verdict.property);
+    for (Verdict& verdict : as_run_->verdicts()) {
+      if (!asked.contains(verdict.property)) judge_.add(std::move(verdict));
+    }
+  }
   // `missing`: so much of what should be there is not.
   const auto whole = [&](const char* what, bool holds, double missing, const std::string& text) {
     Verdict verdict;

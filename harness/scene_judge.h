@@ -1,12 +1,15 @@
-// Judges the run of a scene: every property of every moment, what the scene expects, and that the run was whole. `run
+// Judges the run of a scene: every property of every moment, those of any simulator's run that no moment was asked,
+// what the scene expects, and that the run was whole. `run
 // --check` and `check` feed it the same moments, so they give the same verdicts.
 #pragma once
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "harness/expectations.h"
 #include "harness/judge.h"
 #include "harness/property_summary.h"
+#include "harness/scene_as_run.h"
 
 namespace cutproof::harness {
 
@@ -60,6 +63,7 @@ class SceneJudge {
   Judge judge_;
   PropertySummaries summaries_;
   StagesRun stages_;
+  std::optional<SceneAsRun> as_run_;
   std::vector<std::string> notes_, not_reached_, not_its_own_;
   ExpectationCheck expectations_;
   bool is_stopped_ = false;

@@ -10,7 +10,8 @@
 #include "model/error.h"
 #include "model/io/array_parts.h"
 #include "model/io/input_file.h"
-#include "model/io/recorded_segments.h"
+#include "model/io/recording.h"
+#include "model/io/state_segments.h"
 
 namespace cutproof::io {
 
@@ -78,9 +79,31 @@ bool RunSegments::is_segment(const ArrayFile& contents) {
   return positions != nullptr && positions->shape.size() == 3 && find_array(contents.arrays, "kicked") == nullptr;
 }
 
+struct RunSegments::Recorded {
+  explicit Recorded(const std::string& name)
+      : reader(name), states(reader.header().setup, reader.header().precision, StateSegments::WithSkin::yes) {}
+
+  std::optional<ArrayFile> next() {
+    while (next_snapshot < reader.header().snapshot_count) {
+      const Snapshot snapshot = reader.snapshot(next_snapshot++);
+      if (snapshot.stage == Stage::skin) return states.next(snapshot.state);
+    }
+    return std::nullopt;
+  }
+
+  RecordingReader reader;
+  StateSegments states;
+  int64_t next_snapshot = 0;
+};
+
 RunSegments RunSegments::of(const std::string& path) {
   if (has_segments(path)) return RunSegments(path);
-  if (!is_array_file(path)) return of_recording(path);
+  if (!is_array_file(path)) {
+    RunSegments segments;
+    segments.source_ = path;
+    segments.recorded_ = std::make_shared<Recorded>(path);
+    return segments;
+  }
   std::vector<ArrayFile> only;
   only.push_back(read_array_file(path));
   if (find_array(only.front().arrays, "kicked") != nullptr)
@@ -88,13 +111,6 @@ RunSegments RunSegments::of(const std::string& path) {
   if (!is_segment(only.front()))
     throw InputError(path, "positions", "This is no run.", "Write positions with the axes frame, particle and 3.");
   return RunSegments(path, std::move(only));
-}
-
-RunSegments RunSegments::of_recording(const std::string& name) {
-  RunSegments segments;
-  segments.source_ = name;
-  segments.recorded_ = std::make_shared<RecordedSegments>(name);
-  return segments;
 }
 
 RunSegments::RunSegments(std::string path) : path_(std::move(path)), source_(path_) {

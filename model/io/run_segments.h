@@ -12,8 +12,6 @@
 
 namespace cutproof::io {
 
-class RecordedSegments;
-
 class RunSegments {
  public:
   // Whether this is a folder, or an HDF5 file with the group 000000.
@@ -29,9 +27,6 @@ class RunSegments {
   RunSegments(std::string source, std::vector<ArrayFile> segments)
       : source_(std::move(source)), in_memory_(std::move(segments)) {}
 
-  // Of a recording.
-  static RunSegments of_recording(const std::string& name);
-
   // The next one, or nothing after the last; the first with what is given once per run. Throws what read_array_file
   // throws, and InputError if all so far have become more than files of their size may.
   std::optional<ArrayFile> next();
@@ -44,7 +39,8 @@ class RunSegments {
   bool is_folder_ = false;
   std::vector<std::string> names_;
   std::vector<ArrayFile> in_memory_;  // without names
-  std::shared_ptr<RecordedSegments> recorded_;
+  struct Recorded;
+  std::shared_ptr<Recorded> recorded_;
   std::size_t next_ = 0;
   uint64_t file_bytes_ = 0, read_bytes_ = 0;  // so far
 };

@@ -1,4 +1,4 @@
-#include "model/io/recorded_segments.h"
+#include "model/io/state_segments.h"
 
 #include <algorithm>
 #include <utility>
@@ -17,8 +17,7 @@ Array vectors(std::string name, const std::vector<Vec3>& all, std::vector<int64_
 Array number(std::string name, double value) { return make_array<double>(std::move(name), {}, {value}); }
 
 // What is given once: the body and how it is simulated.
-void add_once(const Recording& recording, Arrays& arrays) {
-  const Setup& setup = recording.setup;
+void add_once(const Setup& setup, Precision precision, Arrays& arrays) {
   const Body& body = setup.body;
   const int64_t n = body.particle_count();
   std::vector<Vec3> rest;
@@ -35,7 +34,7 @@ void add_once(const Recording& recording, Arrays& arrays) {
   arrays.push_back(vectors("gravity", {setup.step.gravity}, {3}));
   arrays.push_back(number("spacing", body.grid.spacing));
   arrays.push_back(number("damping", setup.step.damping));
-  arrays.push_back(number("unit_roundoff", unit_roundoff(recording.precision)));
+  arrays.push_back(number("unit_roundoff", unit_roundoff(precision)));
   arrays.push_back(make_array<int64_t>("steps", {}, {setup.step.substeps}));
 }
 
@@ -55,26 +54,18 @@ std::vector<uint8_t> held_in(const Setup& setup, int64_t frame) {
 
 }  // namespace
 
-std::optional<ArrayFile> RecordedSegments::next() {
-  const Recording& recording = reader_.header();
-  const Setup& setup = recording.setup;
-  std::optional<Snapshot> snapshot;
-  do {
-    if (next_ == recording.snapshot_count) return std::nullopt;
-    snapshot = reader_.snapshot(next_++);
-  } while (snapshot->stage != Stage::skin);
-  const State& state = snapshot->state;
+ArrayFile StateSegments::next(const State& state) {
   const bool is_first = !std::exchange(has_begun_, true);
-  const int64_t frame = state.frame - 1, n = setup.body.particle_count();
+  const int64_t frame = state.frame - 1, n = setup_.body.particle_count();
   ArrayFile made;
   Arrays& arrays = made.arrays;
-  if (is_first) add_once(recording, arrays);
+  if (is_first) add_once(setup_, precision_, arrays);
   arrays.push_back(vectors("positions", state.x, {n, 3}));
   arrays.push_back(vectors("velocities", state.v, {n, 3}));
   arrays.push_back(make_array("alive", {n}, state.alive));
-  if (!is_first && frame >= 0 && frame < setup.frame_count()) {
-    time_ += setup.substep_length[at(frame)] * setup.step.substeps;
-    arrays.push_back(make_array("held", {n}, held_in(setup, frame)));
+  if (!is_first && frame >= 0 && frame < setup_.frame_count()) {
+    time_ += setup_.substep_length[at(frame)] * setup_.step.substeps;
+    arrays.push_back(make_array("held", {n}, held_in(setup_, frame)));
     arrays.push_back(vectors("contact_impulse", {state.impulse}, {3}));
   }
   arrays.push_back(number("time", time_));
@@ -85,7 +76,7 @@ std::optional<ArrayFile> RecordedSegments::next() {
     offsets_ = clusters.offsets;
     members_ = clusters.members;
   }
-  if (!state.skin.triangles.empty()) {
+  if (with_skin_ == WithSkin::yes && !state.skin.triangles.empty()) {
     std::vector<int32_t> corners;
     for (const auto& triangle : state.skin.triangles) corners.insert(corners.end(), triangle.begin(), triangle.end());
     arrays.push_back(vectors("vertices", state.skin.position, {std::ssize(state.skin.position), 3}));
