@@ -443,6 +443,7 @@ class RunJudge::Implementation {
       found_[kMomentum].why = found_[kCentre].why = "mass is not given of all, or particles come and go in every frame";
       return;
     }
+    if (std::find(exists_.begin(), exists_.end(), 1) == exists_.end()) return;
     const bool is_held = std::any_of(frame.held.begin(), frame.held.end(), [](uint8_t held) { return held != 0; });
     const bool is_free = header_.promised(RunPromise::free);
     if (!is_free && !frame.contact_impulse) return;

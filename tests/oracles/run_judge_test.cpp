@@ -127,6 +127,17 @@ TEST(RunJudge, HoldsOfABarThatIsPartedByItsBlade) {
   for (int k = 0; k < 24; ++k) EXPECT_EQ(bar.piece_of.at(at(k)), k % 6 >= 3 ? 3 : 0);
 }
 
+TEST(RunJudge, HoldsOfABarThatIsWhollyRemoved) {
+  Bar bar;
+  for (std::size_t f = 6; f < bar.alive.size(); ++f) {
+    std::fill(bar.alive[f].begin(), bar.alive[f].end(), 0);
+    bar.coupling[f] = {};
+    bar.coupling[f].offsets = {0};
+    bar.piece[f].assign(24, -1);
+  }
+  EXPECT_EQ(failing(bar), "");
+}
+
 // What the judge's own sums round is no fault of a run.
 TEST(RunJudge, HoldsOfManyParticles) {
   constexpr double kDt = 0.01;
