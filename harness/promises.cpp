@@ -27,7 +27,7 @@ constexpr std::array kRotations = {std::string_view("rotation"), std::string_vie
 constexpr std::array kMomentum = {std::string_view("linear momentum"), std::string_view("component momentum"),
                                   std::string_view("centre of mass")};
 constexpr std::array kMotion = {std::string_view("motion"), std::string_view("admissible step"),
-                                std::string_view("step by iterates"), std::string_view("no teleport")};
+                                std::string_view("step by iterates")};
 constexpr std::array kBladeOut = {std::string_view("no pass")};
 constexpr std::array kSkin = {std::string_view("skin match"),     std::string_view("skin surface"),
                               std::string_view("skin vertices"),  std::string_view("skin shells"),

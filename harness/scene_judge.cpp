@@ -41,7 +41,8 @@ void SceneJudge::stop() {
 
 void SceneJudge::finish() {
   if (as_run_) {
-    std::set<std::string> asked = {"run well formed"};
+    // Of each step *motion* asks what *no teleport* asks of a frame.
+    std::set<std::string> asked = {"run well formed", "no teleport"};
     for (const Verdict& verdict : judge_.verdicts()) asked.insert(verdict.property);
     for (Verdict& verdict : as_run_->verdicts()) {
       if (!asked.contains(verdict.property)) judge_.add(std::move(verdict));

@@ -39,7 +39,7 @@ enum Which : std::size_t {
 };
 
 // How much faster than any velocity at the ends of frames those in between may be, about their mean.
-constexpr double kBetween = 2;
+constexpr double kBetween = 4;
 
 // One whose square is none is beyond all bounds.
 bool is_number(Vec3 x) { return std::isfinite(dot(x, x)); }
@@ -76,6 +76,24 @@ constexpr RunProperty kRunProperties[kProperties] = {
 
 }  // namespace
 
+// The most particles that share a coordinate.
+int64_t largest_plane(std::span<const Vec3> places) {
+  std::ptrdiff_t most = 1;
+  std::vector<double> values(places.size());
+  for (double Vec3::*const axis : {&Vec3::x, &Vec3::y, &Vec3::z}) {
+    for (std::size_t i = 0; i < places.size(); ++i) values[i] = places[i].*axis;
+    std::erase_if(values, [](double value) { return std::isnan(value); });
+    std::sort(values.begin(), values.end());
+    for (auto begin = values.begin(); begin != values.end();) {
+      const auto end = std::upper_bound(begin, values.end(), *begin);
+      most = std::max(most, end - begin);
+      begin = end;
+    }
+    values.resize(places.size());
+  }
+  return most;
+}
+
 class RunJudge::Implementation {
  public:
   explicit Implementation(RunHeader header) : header_(std::move(header)), found_(kProperties) {
@@ -96,6 +114,10 @@ class RunJudge::Implementation {
       fail(kForm, {}, "weight {} of groups_weights is {}", bad - coupling_.weights.begin(), *bad);
     }
     is_coupled_ = !offsets.empty() || coupling_.corners > 0;  // no groups are an answer, too: nothing is coupled
+    largest_group_ = coupling_.corners;
+    for (std::size_t g = 0; g + 1 < offsets.size(); ++g) {
+      largest_group_ = std::max(largest_group_, offsets[g + 1] - offsets[g]);
+    }
     is_new_coupling_ = true;
   }
 
@@ -121,6 +143,7 @@ class RunJudge::Implementation {
     check_finite(frame);
     if (!holds(kFinite) || !holds(kForm)) return;
     if (frames_ == 1) {
+      largest_plane_ = largest_plane(frame.positions);
       lay_tissue();
       if (tissue_) pieces_at_first_ = tissue_->apart().count;
     }
@@ -406,12 +429,8 @@ class RunJudge::Implementation {
     }
     const Vec3 gravity = header_.gravity.value_or(Vec3{});
     const double between = fastest_ + norm(mean - mean_was - dt * gravity);
-    // Velocities may be damped behind the way that they have made, by exp(c dt) - 1 or 1 / (1 - c dt) - 1 of
-    // themselves.
-    const double decay = header_.damping * dt;
-    const double bound = kBetween * dt * between + 0.5 * dt * dt * norm(gravity) +
-                         dt * fastest * (decay + 2 * decay * decay) +
-                         4 * header_.u * static_cast<double>(header_.steps) * farthest +
+    const double bound = kBetween * dt * (between + fastest * lag(dt)) + 0.5 * dt * dt * norm(gravity) +
+                         4 * header_.u * (static_cast<double>(header_.steps) * farthest + *frame.time * fastest) +
                          (header_.promised(RunPromise::free) ? 0 : sweep_reach(frame)) + header_.cut_resolution;
     for (std::size_t i = 0; i < was_.size(); ++i) {
       if (exists_[i] == 0 || existed_[i] == 0 || (!frame.held.empty() && frame.held[i] != 0)) continue;
@@ -423,6 +442,12 @@ class RunJudge::Implementation {
              "m/s from their mean",
              i, off, frame_, between);
     }
+  }
+  // By what share of itself a velocity may be behind the way that it has made: schemes damp it by exp(c dt / S), or by
+  // 1 - c dt / S while that is positive, once the particle has moved.
+  double lag(double dt) const {
+    const double decay = header_.damping * dt / static_cast<double>(header_.steps);
+    return std::max(std::expm1(decay), decay < 1 ? decay / (1 - decay) : 0);
   }
   // How far a blade may have pushed something out of its way: as far as it sweeps in this frame.
   static double sweep_reach(const RunFrame& frame) {
@@ -470,24 +495,30 @@ class RunJudge::Implementation {
     const Vec3 p = p_sum, p_was = p_was_sum, x = x_sum, x_was = x_was_sum;
     const auto mass = static_cast<double>(mass_sum);
     const double steps = static_cast<double>(header_.steps), decay = header_.damping * dt;
-    const double rounding = kDeviations * header_.u * std::sqrt(steps * squares);
+    // What a group rounds once, as the translation of a cluster, moves all of its particles alike; and particles of a
+    // grid that move alike have equal coordinates, which round alike.
+    const auto alike = static_cast<double>(std::max(largest_group_, largest_plane_));
+    const double rounding = kDeviations * header_.u * std::sqrt(steps * alike * squares);
     // A scheme damps by (1 - c dt / S)^S, its inverse, or between: (c dt)² off the exponential at most, and what is
     // added meanwhile is damped or not.
     const double pushed = norm(impulse) + mass * norm(gravity) * dt + norm(p_was);
+    // The impulse is a sum over particles and substeps.
+    const double adding = kDeviations * header_.u * std::sqrt(steps * static_cast<double>(n_)) * norm(impulse);
     const Vec3 expected =
         std::exp(-decay) * p_was + (decay > 0 ? -std::expm1(-decay) / decay : 1) * (mass * dt * gravity) + impulse;
     const double slack =
         decay * decay * norm(p_was) + (decay + decay * decay) * (norm(impulse) + mass * norm(gravity) * dt);
     const double off = norm(p - expected);
-    if (!within(kMomentum, off, rounding + slack + 4 * header_.u * pushed))
+    if (!within(kMomentum, off, rounding + slack + adding + 4 * header_.u * pushed))
       fail(kMomentum, {}, "momentum changes by {:.3g} kg m/s in frame {} more than gravity and contacts explain", off,
            frame_);
     if (norm(impulse) == 0 && !is_held && (is_free || frame.blade.empty())) {
       // The mean velocity of the frame lies between those of its ends; half a substep of gravity either way.
       const Vec3 middle = 0.5 * (p + p_was);
       const double way = norm((x - x_was) - dt * middle) / mass;
-      const double between = 0.5 * dt * norm(p - p_was) / mass;
-      const double places = kDeviations * header_.u * std::sqrt(steps) * farthest;
+      const double between = dt * (0.5 * norm(p - p_was) + lag(dt) * std::max(norm(p), norm(p_was))) / mass;
+      const double places =
+          header_.u * (kDeviations * std::sqrt(steps) * farthest + 4 * *frame.time * norm(middle) / mass);
       if (!within(kCentre, way, between + places + dt * rounding / mass))
         fail(kCentre, {}, "the centre of mass is {:.3g} m from where its velocity takes it in frame {}", way, frame_);
       angular(frame, x / mass, x_was / mass, p / mass, p_was / mass, rounding, farthest);
@@ -730,6 +761,7 @@ class RunJudge::Implementation {
   std::vector<Found> found_;
   std::vector<std::string> notes_;
   RunCoupling coupling_;
+  int64_t largest_group_ = 0, largest_plane_ = 1;  // particles: in a group; with equal coordinates in the first frame
   bool is_coupled_ = false, is_new_coupling_ = false, is_new_gone_ = false, is_new_mass_ = false, has_blade_ = false;
   int64_t frame_ = 0, frames_ = 0, n_ = 0, coupled_count_ = 0, last_cut_ = -1;
   std::vector<uint8_t> exists_, existed_, ever_;  // [n]
