@@ -88,7 +88,7 @@ PropertyList make_core_properties() {
                "no edge of free particles is alive", check_no_pass, stages(detect)),
       of_state("skin surface", "method.md §8: closed, oriented, 2-manifold", "1", kAlive | kSkin, kSkinThere, "no skin",
                check_skin_surface),
-      of_state("skin vertices", "tolerances.md, One goal position", "h", kAlive | kSkin | kSets | kRotations | kMotion,
+      of_state("skin vertices", "tolerances.md, One skin vertex", "h", kAlive | kSkin | kSets | kRotations | kMotion,
                kSkinThere, "no skin", check_skin_vertices),
       of_stage("skin reach",
                "method.md §8: where a vertex lies on its edge; tolerances.md, Where a blade crossed an edge", "h",
