@@ -355,7 +355,7 @@ ForeignVerdicts judge_foreign_state(const ForeignState& foreign) {
     found.verdicts.push_back(plausible_places(foreign));
     if (foreign.pieces) found.verdicts.push_back(as_many_pieces(foreign, found));
   }
-  Verdict judged = of_file("something was judged", "oracles.md, Somebody else's state");
+  Verdict judged = of_file("something was judged", "oracles.md, A state from a file");
   judged.checked = 1;
   judged.holds = anything_was_judged(found.verdicts);
   judged.measured = judged.holds ? 0 : 1;

@@ -118,7 +118,7 @@ const PropertyList& motion_properties() {
 const PropertyList& lone_state_properties() {
   constexpr unsigned kFit = kSets | kMotion | kRotations;
   static const PropertyList list = {
-      of_state("tissue kept", "oracles.md, Somebody else's state", "1", kAlive | kCut, kAlways, "nothing is dead",
+      of_state("tissue kept", "oracles.md, A state from a file", "1", kAlive | kCut, kAlways, "nothing is dead",
                check_tissue_kept),
       of_state("rotation match", "tolerances.md, Rotations of a state", "1", kFit, kAlways,
                "no cluster whose particles tell its rotation", check_rotation_match),

@@ -73,7 +73,7 @@ export function sourceNodes(source) {
 // --- Properties
 
 // Of each section of oracles.md the first sentence on each property; of a name in several, a page's own section counts.
-const kOwn = { check_run: 'A run of any simulator', kick: 'A kick', relate: 'Two runs that correspond' };
+const kOwn = { run: 'A whole run', check: 'A whole run', check_run: 'A run of any simulator', check_state: 'A state from a file', kick: 'A kick', relate: 'Two runs that correspond' };
 let known = null;
 function sentences() {
   if (known) return known;
