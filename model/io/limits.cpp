@@ -16,54 +16,39 @@ std::string row(std::string_view file, std::string_view what, const std::string&
 }
 
 std::string json_rows(const JsonLimits& limits, std::string_view read_by) {
-  return row(fmt::format("{} ({})", limits.what, read_by), "bytes", bytes_text(limits.bytes)) +
-         row("", "brackets within brackets", count_text(static_cast<uint64_t>(limits.depth))) +
-         row("", "values, names of fields included", count_text(static_cast<uint64_t>(limits.values)));
+  return row(fmt::format("{} ({})", limits.what, read_by), "size, values",
+             fmt::format("{}, {}", bytes_text(limits.bytes), count_text(static_cast<uint64_t>(limits.values))));
 }
 
-constexpr std::string_view kHead = R"(# Limits of what is read
+constexpr std::string_view kHead = R"(# Limits of readers
 
-This page is what `cutproof info --limits` prints; a test sees to it that the
-two are equal.
-
-What goes beyond a limit is refused with exit status 2, before memory is taken
-for it; the error names the limit. A scene, counterexample, result or question
-within the limits is read in seconds and some hundred megabytes.
-
-What is read of each at most:
+`cutproof info --limits` prints this page. A reader refuses a file beyond a
+limit with exit status 2, before it allocates memory, and names the limit. Names
+of fields count as values.
 
 )";
 
 constexpr std::string_view kRest = R"(
-**Regular files only.** Files to read may be links, but what these lead to must
-be a regular file. Pipes, sockets, devices and folders are refused before they
-are opened, so nothing waits. That holds for process substitution, `<(...)`,
-too, and for `/dev/stdin` unless it is a file (`< scene.json`): write into a
-file first what comes through a pipe.
+**Regular files only**, or links to them. Pipes, sockets, devices and folders
+(except of runs) are refused unopened, so no reader waits. So are `<(...)`, and
+`/dev/stdin` unless it is a file (`< scene.json`).
 
-**What is compressed** (recordings, NPZ, HDF5) is refused before it is inflated
-if it would become larger than the last two limits say, each number of a file of
-arrays counted as 8 bytes, all segments of a run together. HDF5 files hold
-everything themselves: links to other files, soft links, data in other files
-(external storage, virtual datasets) and filters that are not HDF5's own are
-refused, and no filter is loaded.
+**Compressed data** (recordings, NPZ, HDF5) is refused before inflation beyond
+the last limit. In files of arrays each number counts as 8 bytes; segments of a
+run count together. HDF5 files must contain all their data: soft and external
+links, external storage, virtual datasets and foreign filters are refused.
 
-**Meshes** are read as STL (text, or binary with or without attribute bytes
-behind each triangle), OBJ, PLY (text or binary, corners of every type of
-integers, polygons or triangle strips) and OFF as text ([ST][C][N][4]OFF), each
-in ASCII or UTF-8, with or without a byte order mark, with lines that end in
-any way, and with numbers as C or Fortran print them. Colours, normals and
-textures are passed over. Refused by name: text in UTF-16 or UTF-32, decimal
-commas, binary OFF, nOFF, and vertices of an OBJ with a weight other than 1.
+**Meshes**: STL (text, or binary with or without attribute bytes), OBJ, text OFF
+([ST][C][N][4]OFF), and PLY (text or binary; any integer type). Faces of PLY may
+be polygons or triangle strips. Text is ASCII or UTF-8, with any line
+ends, and numbers as C or Fortran print them. Colours, normals and textures are
+ignored. UTF-16, UTF-32, decimal commas, binary OFF, nOFF and OBJ weights other
+than 1 are refused.
 
-**Names.** A file may have any name, UTF-8 or not, without line ends, which are
-refused on the command line. Names of plugins (`judge FILE.so`, `--backend
-plugin:FILE.so`) are kept in counterexamples, so they must be UTF-8. What is
-printed of names and of texts from files has `\x1b`, `\u202e` and the like in
-place of what would act on a terminal or change the direction of reading, and
-`\xe9` for a byte that is no UTF-8; commands to be given again quote such names
-as `$'caf\xe9.json'`. JSON, JUnit and annotations have the same, and stay valid
-UTF-8.
+**Names** of files may hold any bytes except line ends; names of plugins must be
+UTF-8. Output, JSON and JUnit included, escapes control and bidirectional
+characters (`\x1b`, `\u202e`) and bytes that are not UTF-8 (`\xe9`). Commands
+quote such names: `$'caf\xe9.json'`.
 )";
 
 }  // namespace
@@ -77,36 +62,37 @@ std::string bytes_text(uint64_t bytes) {
 
 std::string limits_reference() {
   std::string text(kHead);
+  text += row("Any JSON file", "nested brackets", count_text(static_cast<uint64_t>(kSceneLimits.depth)));
   text += json_rows(kSceneLimits, "`run`, `tune`, `bench`");
-  text += row("", "bytes of `name`, of `description`, of `mesh.file`",
+  text += row("", "bytes of `name`, `description`, `mesh.file`",
               fmt::format("{}, {}, {}", count_text(kMostNameBytes), count_text(kMostDescriptionBytes),
                           count_text(kMostPathBytes)));
-  text += row("", "shapes, those within others included", count_text(kMostShapes));
+  text += row("", "shapes, also nested", count_text(kMostShapes));
   text +=
-      row("", "strokes, points of a stroke", fmt::format("{}, {}", count_text(kMostStrokes), count_text(kMostPoints)));
+      row("", "strokes, points per stroke", fmt::format("{}, {}", count_text(kMostStrokes), count_text(kMostPoints)));
   text += row("", "walls, grips", fmt::format("{}, {}", count_text(kMostWalls), count_text(kMostGrips)));
   text += row("", "substeps times grips", count_text(kMostGripSubsteps));
   text += json_rows(kCounterexampleLimits, "`replay`");
   text +=
-      row("", "particles, commands, decisions of a schedule",
+      row("", "particles, commands, schedule decisions",
           fmt::format("{}, {}, {}", count_text(kMostCaseNodes), count_text(kMostCommands), count_text(kMostDecisions)));
-  text += row("", "grid nodes of the box around the particles", count_text(kMostCaseCells));
+  text += row("", "grid nodes of their box", count_text(kMostCaseCells));
   text += json_rows(kResultsLimits, "`report`");
   text += json_rows(kCampaignLimits, "`fuzz --merge`");
   text += row("", "properties", count_text(kMostProperties));
   text += json_rows(kQuestionLimits, "`judge --case`");
-  text += row("A mesh (`--mesh`, `mesh.file`)", "bytes", bytes_text(kMostMeshBytes));
+  text += row("A mesh (`--mesh`, `mesh.file`)", "size", bytes_text(kMostMeshBytes));
   text += row("", "faces, vertices", fmt::format("{0}, {0}", count_text(kMostMeshElements)));
-  text += row("A file of arrays (`check`, `kick`, `check-vectors`)", "arrays, axes of an array",
+  text += row("An array file (`check`, `kick`, `relate`, `check-vectors`)", "arrays, axes per array",
               fmt::format("{}, {}", kMostArrays, kMostArrayAxes));
-  text += row("", "bytes of all arrays in memory, of a text",
+  text += row("", "all arrays together, one text",
               fmt::format("{}, {}", bytes_text(kMostArrayBytes), bytes_text(kMostTextBytes)));
-  text += row("A run (`check`)", "segments, each with the arrays of one file", count_text(kMostSegments));
-  text += row("", "patches of the blade in a frame", count_text(kMostPatches));
+  text += row("A run (`check`, `relate`)", "segments", count_text(kMostSegments));
+  text += row("", "blade patches per frame", count_text(kMostPatches));
   text +=
       row("A recording (`check`, `digest`, `report`)", "snapshots", count_text(static_cast<uint64_t>(kMostSnapshots)));
-  text += row("What is compressed", "bytes that it may become in any case", bytes_text(kFreeInflation));
-  text += row("", "and beyond these, in sizes of the file", fmt::format("{} times", kMostInflation));
+  text += row("Compressed data, inflated", "larger of",
+              fmt::format("{}, {} times the file", bytes_text(kFreeInflation), kMostInflation));
   text += kRest;
   return text;
 }
