@@ -198,7 +198,7 @@ Coincident coincident_particles(const ForeignState& foreign) {
 }
 
 Verdict as_many_pieces(const ForeignState& foreign, const ForeignVerdicts& found) {
-  Verdict verdict = of_file("pieces", "foreign_state.md, A state");
+  Verdict verdict = of_file("pieces", "state.md, A state");
   verdict.checked = 1;
   verdict.measured = static_cast<double>(*found.pieces);
   verdict.bound = static_cast<double>(*foreign.pieces);

@@ -1,4 +1,4 @@
-// One state that somebody else's simulator wrote, from named arrays (docs/reference/foreign_state.md).
+// One state that somebody else's simulator wrote, from named arrays (docs/reference/state.md).
 #pragma once
 #include <optional>
 #include <set>

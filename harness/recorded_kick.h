@@ -1,4 +1,4 @@
-// The kick test from a file of arrays (docs/reference/foreign_state.md, A kick).
+// The kick test from a file of arrays (docs/reference/state.md, A kick).
 #pragma once
 #include <string>
 #include <vector>

@@ -726,9 +726,9 @@ def judge(*, rotations=None, components=None, surface=None, clusters=None, disse
     """Asks the functions that are given, each in many cases. Returns a Result; raises Failed, Skipped or Error.
 
     cases, seconds: how many matrices, bodies or scenes for each function, or for how long. sizes: of large questions, as
-    matrices or particles; (): none; None: beside 65536 and more. promises: words of what is vouched for; None: what goes
-    without saying. limits: words of what `dissect` takes; None: all. time_limit: seconds for each answer. simplify:
-    seconds for making each failing case smaller. save: folder for failing cases. keep_going: beyond ten questions that
+    matrices or particles; (): none; None: beside 65536 and more. promises: words of what is judged; None: the default
+    promises. limits: words of what `dissect` takes; None: all. time_limit: seconds for each answer. simplify:
+    seconds for shrinking each failing case. save: folder for failing cases. keep_going: beyond ten questions that
     were not answered.
     """
     __tracebackhide__ = True  # pytest shows the caller, not us
@@ -779,7 +779,7 @@ def kick(positions, kicked, piece, **arrays):
 
     positions (f, n, 3): where particles were, frame by frame, in m. kicked (f, n, 3): the same with a kick of one
     piece; or a list of such runs. piece (n): which particles belong together. arrays: again, alive, kicked_piece, directions,
-    equal, tolerance, mass, steps, spacing, time: docs/reference/foreign_state.md, A kick.
+    equal, tolerance, mass, steps, spacing, time: docs/reference/state.md, A kick.
     """
     __tracebackhide__ = True
     return _judge_arrays(["kick", "kick.npz"], kick=dict(arrays, positions=positions, kicked=kicked, piece=piece))

@@ -100,7 +100,7 @@ typedef struct cutproof_plugin {
   uint32_t size; /* sizeof(cutproof_plugin) */
   uint32_t abi;  /* CUTPROOF_ABI */
   const char *name, *version;
-  const char* promises; /* words of docs/reference/plugins.md; null: those that go without saying */
+  const char* promises; /* words of docs/reference/plugins.md; null: default promises */
   int32_t device;       /* where data is wanted */
   int32_t real;         /* CUTPROOF_F32 or CUTPROOF_F64; 0: f32 */
   /* An instance; `self` of all others. Null: it cannot run here, which is no failure. Without it, self is null. */
