@@ -28,7 +28,7 @@ namespace {
 
 using nlohmann::json;
 
-// Frames of the lookup table: name on the command line, member, in the order of guide.md, Errors.
+// Frames of the lookup table: name on the command line, member, in the order of measure_and_tune.md, Errors.
 struct Kind {
   const char* name;
   bool ErrorsWanted::*member;

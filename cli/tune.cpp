@@ -1,4 +1,4 @@
-// `cutproof tune`: the cheapest configuration of a scene within a tolerance (guide.md, Tuning).
+// `cutproof tune`: the cheapest configuration of a scene within a tolerance (measure_and_tune.md, Tuning).
 #include "tuning/tune.h"
 
 #include <fmt/format.h>

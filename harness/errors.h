@@ -1,4 +1,4 @@
-// The errors of one run (docs/guide.md, Errors).
+// The errors of one run (docs/how_to/measure_and_tune.md, Errors).
 #pragma once
 #include <cstdint>
 #include <memory>

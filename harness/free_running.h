@@ -1,5 +1,5 @@
 // A backend and the reference that start alike and run freely, until the first decision in which they differ
-// (guide.md, Implementation).
+// (measure_and_tune.md, Implementation).
 #pragma once
 #include <cstdint>
 #include <functional>

@@ -1,6 +1,6 @@
 // A backend's run beside the reference, in lockstep: before each stage the reference takes the backend's state, then
-// both run the stage (guide.md, Implementation). What is measured is the error of one frame, and a decision that falls
-// within its rounding band does not spread to the next stage.
+// both run the stage (measure_and_tune.md, Implementation). What is measured is the error of one frame, and a decision
+// that falls within its rounding band does not spread to the next stage.
 #pragma once
 #include <array>
 #include <cstdint>

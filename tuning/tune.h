@@ -1,4 +1,4 @@
-// The cheapest configuration of a scene whose error is within a tolerance (guide.md, Tuning).
+// The cheapest configuration of a scene whose error is within a tolerance (measure_and_tune.md, Tuning).
 #pragma once
 #include <functional>
 #include <nlohmann/json.hpp>

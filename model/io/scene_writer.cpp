@@ -204,9 +204,9 @@ absent, and its bounds.
 
 A scene is a JSON file (UTF-8, no comments). It says what is cut, how it is
 simulated, what the blade does, and what must come out. A whole one, `cylinder`,
-is drawn in guide.md, Scenes and recordings. Fields that are absent have their
-default; a field that is not listed here, or that is given twice, is an error,
-and so is a value out of bounds. Units are SI unless stated:
+is drawn in judge_a_run.md, A scene of your own. Fields that are absent have
+their default; a field that is not listed here, or that is given twice, is an
+error, and so is a value out of bounds. Units are SI unless stated:
 
 - **box**: coordinates in the bounding box of the body's particles at rest,
   after alignment: (0, 0, 0) is its lower corner and (1, 1, 1) its upper one,

@@ -17,7 +17,7 @@ std::string in_unit(const std::string& figure, const std::string& unit);
 // How much of its bound something has, for a person: 1 is said only of what is exactly there, neither of what nearly
 // fails nor of what is just beyond.
 std::string share_of(double of_bound);
-// One that fails, in one line for a person (guide.md, Reading a verdict).
+// One that fails, in one line for a person (tutorial.md, Reading a verdict).
 std::string verdict_text(const Verdict& verdict);
 // Of it what was measured, the bound, and the witness.
 std::string measured_text(const Verdict& verdict);

@@ -1,5 +1,5 @@
 // What a body that meets nothing must keep: momentum and mass, and of energy that it does
-// not grow. docs/guide.md, Conservation says what each figure means and what it does not.
+// not grow. measure_and_tune.md, Conservation says what is measured.
 #pragma once
 #include <optional>
 

@@ -1,5 +1,5 @@
-// The shape of a cut beside the ideal one. Figures, not verdicts: docs/guide.md, Geometry says
-// what each of them means and what it does not. Where something is broken a figure is not a number; nothing is left
+// The shape of a cut beside the ideal one. Figures, not verdicts: measure_and_tune.md, Geometry says
+// what each of them means. Where something is broken a figure is not a number; nothing is left
 // out.
 #pragma once
 #include <array>

@@ -1,5 +1,5 @@
-// How far separated pieces stand in each other. Figures, not verdicts: docs/guide.md, Geometry
-// says what they mean and what they do not.
+// How far separated pieces stand in each other. Figures, not verdicts: measure_and_tune.md, Geometry
+// says what they mean.
 #pragma once
 #include "model/setup.h"
 #include "model/state.h"

@@ -1,5 +1,5 @@
 // The error that is left because time goes in steps. Figures, not verdicts:
-// docs/guide.md, Time step says what each of them means and what it does not. Lengths are in h, the spacing of the
+// measure_and_tune.md, Time step says what each of them means. Lengths are in h, the spacing of the
 // grid; what is broken or not a number is infinitely wrong.
 #pragma once
 #include <functional>

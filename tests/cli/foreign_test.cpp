@@ -1,4 +1,4 @@
-// `cutproof check` of a state and `cutproof kick`, as the guide says that they are used, and what they print and write.
+// `cutproof check` of a state and `cutproof kick`, used as on the page of runs, and what they print and write.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,23 +18,23 @@ using tests::As;
 
 class Foreign : public Program {
  protected:
-  // What stands in the guide below "Somebody else's simulator" in Python, in order.
-  static std::vector<std::string> programs_of_the_guide() {
-    std::ifstream page(files::path(CUTPROOF_SOURCE) / "docs/guide.md");
-    std::vector<std::string> programs;
-    bool in_section = false, in_program = false;
+  // What stands on the page of runs in Python: of a kick, of a state.
+  static std::string program_of_the_page(const std::string& writes) {
+    std::ifstream page(files::path(CUTPROOF_SOURCE) / "docs/how_to/judge_a_run.md");
+    std::string program;
+    bool in_program = false;
     for (std::string line; std::getline(page, line);) {
-      if (line.starts_with("## ")) in_section = line == "## Somebody else's simulator";
       if (in_program && line == "```") {
+        if (program.find(writes) != std::string::npos) return program;
         in_program = false;
       } else if (in_program) {
-        programs.back() += line + "\n";
-      } else if (in_section && line == "```python") {
+        program += line + "\n";
+      } else if (line == "```python") {
         in_program = true;
-        programs.emplace_back();
+        program.clear();
       }
     }
-    return programs;
+    throw std::logic_error("no program on the page writes " + writes);
   }
   void python(const std::string& program) const {
     write("program.py", program);
@@ -43,7 +43,7 @@ class Foreign : public Program {
   }
   static std::string replaced(std::string text, const std::string& what, const std::string& by) {
     const std::size_t at = text.find(what);
-    if (at == std::string::npos) throw std::logic_error("the guide does not say \"" + what + "\" any more");
+    if (at == std::string::npos) throw std::logic_error("the page does not say \"" + what + "\" any more");
     return text.replace(at, what.size(), by);
   }
   static const json& entry(const json& list, const std::string& property) {
@@ -54,11 +54,10 @@ class Foreign : public Program {
   }
 };
 
-TEST_F(Foreign, StateOfTheGuideHolds) {
-  const auto programs = programs_of_the_guide();
-  ASSERT_EQ(programs.size(), 2u);
-  EXPECT_LE(std::count(programs[0].begin(), programs[0].end(), '\n'), 10);
-  python(programs[0]);
+TEST_F(Foreign, StateOfThePageHolds) {
+  const std::string program = program_of_the_page("state.npz");
+  EXPECT_LE(std::count(program.begin(), program.end(), '\n'), 10);
+  python(program);
   const Outcome outcome = cutproof("check state.npz --json verdicts.json");
   EXPECT_EQ(outcome.status, 0) << outcome.output;
   EXPECT_NE(outcome.output.find("36 particles in 3 clusters"), std::string::npos) << outcome.output;
@@ -81,8 +80,8 @@ TEST_F(Foreign, StateOfTheGuideHolds) {
   EXPECT_EQ(entry(document.at("not_judged"), "cap kept").at("why"), "one state does not show what a stage does");
 }
 
-TEST_F(Foreign, StateOfTheGuideIsRejectedOnceItIsWrong) {
-  const std::string right = programs_of_the_guide().at(0);
+TEST_F(Foreign, StateOfThePageIsRejectedOnceItIsWrong) {
+  const std::string right = program_of_the_page("state.npz");
   // The middle slab is missing; two slabs are torn apart; one has a particle that is not there.
   for (const auto& [change, to, property] : std::vector<std::array<std::string, 3>>{
            {"for k in range(3)]", "for k in (0, 2)]", "component match"},
@@ -105,8 +104,8 @@ TEST_F(Foreign, StateOfTheGuideIsRejectedOnceItIsWrong) {
   expect_refused("check state.npz", {"rest", "(36, 3)", "(35, 3)"});
 }
 
-TEST_F(Foreign, KickOfTheGuideHoldsAndAGhostForceDoesNot) {
-  const std::string right = programs_of_the_guide().at(1);
+TEST_F(Foreign, KickOfThePageHoldsAndAGhostForceDoesNot) {
+  const std::string right = program_of_the_page("kick.npz");
   python(right);
   Outcome outcome = cutproof("kick kick.npz --json kick.json");
   EXPECT_EQ(outcome.status, 0) << outcome.output;
@@ -147,7 +146,7 @@ TEST_F(Foreign, KickOfTheGuideHoldsAndAGhostForceDoesNot) {
 }
 
 TEST_F(Foreign, KicksAreToldOneByOne) {
-  const std::string one = replaced(programs_of_the_guide().at(1), "x[10:, 4:, 1] += kick",
+  const std::string one = replaced(program_of_the_page("kick.npz"), "x[10:, 4:, 1] += kick",
                                    "x[10:, 4:, 1] += kick; x[10:, :4, 1] += 4e-9 * kick");
   const std::string program = replaced(one, "kicked=run(0.01)", "kicked=[run(0.01), run(-0.02)]");
   python(replaced(program, "piece=", "tolerance=1e-6, directions=[[0, 1, 0], [0, -1, 0]], piece="));

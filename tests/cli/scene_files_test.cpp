@@ -48,16 +48,16 @@ TEST_F(SceneNames, ThatThereAreNotAreRefusedWithThoseThatThereAre) {
   expect_refused("tune kidny --tolerance 1", {"kidny", "no scene that comes with the program"});
 }
 
-// What the guide says of scenes: a body that nothing holds is pushed away, one that is held is cut, and a geometric cut
-// does not ask.
+// What the page of runs says of scenes: a body that nothing holds is pushed away, one that is held is cut, and a
+// geometric cut does not ask.
 TEST_F(SceneNames, OfYourOwnNeedABodyThatIsHeldOrAGeometricCut) {
   const std::string held =
       R"("grips": [{"low": [0, 0, 0], "high": [0.15, 1, 1]}, {"low": [0.85, 0, 0], "high": [1, 1, 1]}],)";
   const std::string geometric = R"("detect": {"criterion": "geometric"},)";
   constexpr int kLayer = 8 * 8;  // of the block's 20 x 8 x 8 particles
-  std::ifstream page(CUTPROOF_SOURCE "/docs/guide.md");
-  const std::string guide((std::istreambuf_iterator<char>(page)), {});
-  // What the guide says after each speed of a block that nothing holds, with the number that was counted here.
+  std::ifstream page(CUTPROOF_SOURCE "/docs/how_to/judge_a_run.md");
+  const std::string text((std::istreambuf_iterator<char>(page)), {});
+  // What it says after each speed of a block that nothing holds, with the number that was counted here.
   for (const auto& [speed, components_of_free, said] :
        {std::tuple("0.05", 1, std::pair<std::string, std::string>("at 0.05 m/s (", " particles are lost)")),
         std::tuple("0.15", 1, std::pair<std::string, std::string>("at 0.15 m/s (", ")")),
@@ -84,8 +84,8 @@ TEST_F(SceneNames, OfYourOwnNeedABodyThatIsHeldOrAGeometricCut) {
       }
       if (!more.empty()) continue;
       const std::string number = std::to_string(removed);
-      EXPECT_NE(guide.find(said.first + number + said.second), std::string::npos)
-          << "the guide does not say '" << said.first << number << said.second << "'";
+      EXPECT_NE(text.find(said.first + number + said.second), std::string::npos)
+          << "the page does not say '" << said.first << number << said.second << "'";
     }
   }
 }
@@ -139,7 +139,7 @@ TEST_F(Preview, IsRefusedBesideWhatARunIsFor) {
   expect_refused("run cylinder --set blade.length=-1 --preview page.html", {"blade.length"});
 }
 
-// What the guide says of a straight plate on a bent path: with the length that the note tells it leaves no crumbs.
+// What the page of runs says of a straight plate on a bent path: of the length that the note tells it leaves no crumbs.
 TEST_F(SceneNames, OfABladeThatLeavesItsPathLeaveCrumbsUnlessItIsShortEnough) {
   write("arc.json", R"({"version": 5, "name": "arc",
     "body": {"shape": {"kind": "cylinder", "radius": 0.03, "length": 0.08}, "particles": 3000},
