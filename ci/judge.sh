@@ -1,19 +1,19 @@
 #!/usr/bin/env bash
-# A verb of cutproof in continuous integration: leaves results.json, junit.xml and page.html in a folder, and ends as the
-# program does (0: everything holds, 1: something fails, 2: bad input, 3: the machine failed).
-# Usage: judge.sh PACKAGE FOLDER VERB ARGUMENTS...     e.g. judge.sh cutproof-0.1.0-linux-x86_64.tar.gz found check RUN
-#   PACKAGE   the .tar.gz of ci/package.sh, which is unpacked into FOLDER/program unless it is there; "-": the program that
-#             is installed
-#   VERB      run, check, judge or fuzz, which write all three
+# A subcommand of cutproof in continuous integration: leaves results.json, junit.xml and page.html in a folder, and ends as
+# the program does (0: everything holds, 1: something fails, 2: bad input, 3: the machine failed).
+# Usage: judge.sh PACKAGE FOLDER SUBCOMMAND ARGUMENTS...     e.g. judge.sh cutproof-0.1.0-linux-x86_64.tar.gz found check RUN
+#   PACKAGE     the .tar.gz of ci/package.sh, which is unpacked into FOLDER/program unless it is there; "-": the program
+#               that is installed
+#   SUBCOMMAND  run, check, judge or fuzz, which write all three
 set -euo pipefail
 
 refuse() { echo "judge.sh: $1" >&2; exit 2; }
-[ $# -ge 3 ] || refuse "usage: judge.sh PACKAGE FOLDER VERB ARGUMENTS..."
+[ $# -ge 3 ] || refuse "usage: judge.sh PACKAGE FOLDER SUBCOMMAND ARGUMENTS..."
 package=$1 folder=$2
 shift 2
 case $1 in
   run | check | judge | fuzz) ;;
-  *) refuse "\"$1\" is no verb that writes results, JUnit and a page: run, check, judge, fuzz" ;;
+  *) refuse "\"$1\" is no subcommand that writes results, JUnit and a page: run, check, judge, fuzz" ;;
 esac
 program=cutproof
 if [ "$package" != - ]; then

@@ -101,7 +101,7 @@ def judge_examples(archive, options):
                    f"{system}: {line} leaves {left}")
     script = options.source / "ci/judge.sh"
     for command, word in (([script, options.work / "none", options.work / "found", "run"], "no package"),
-                          ([script, archive, options.work / "found", "info"], "no verb"),
+                          ([script, archive, options.work / "found", "info"], "no subcommand"),
                           ([script, script, options.work / "found", "run"], "no whole"), ([script], "usage")):
         done = run(command)
         expect(done.returncode == 2 and word in done.stdout, f"{command} ended with {done.returncode}: {done.stdout}")
