@@ -2,15 +2,17 @@
 """Checks that what pages, comments, scripts, scenes and the texts of verdicts refer to exists.
 
 Usage: check_docs.py [--program CUTPROOF] [--root DIR]
-       check_docs.py --self-test     whether every kind of broken reference is found
+       check_docs.py --self-test     whether everything that is wrong is found
 
-In pages (*.md): relative links and their anchors, pictures, paths in backticks, and with --program every command line:
-verb, suite and options as `--help` knows them. Everywhere: pages by name (method.md), sections by number (method.md §3,
-Blade) or by title (tolerances.md, Energy), paths of our own files, and words that the glossary has replaced.
-A section is a heading, or a phrase in bold. Exit status: 0 all is there, 1 something is not, 2 bad usage.
+In pages (*.md): relative links and their anchors, pictures, paths in backticks, words that prose no longer uses,
+sentences of more than 40 words, hashes of commits, and words beyond the budgets of docs/budgets.json. With --program also
+every command line: subcommand, suite and options as `--help` knows them. Everywhere: pages by name (method.md), sections
+by number (method.md §3, Blade) or by title (tolerances.md, Energy), paths of our own files, and words that the glossary
+has replaced. A section is a heading, or a phrase in bold. Exit status: 0 nothing found, 1 something found, 2 bad usage.
 """
 import argparse
 import fnmatch
+import json
 import os
 import pathlib
 import re
@@ -19,21 +21,27 @@ import subprocess
 import sys
 import tempfile
 
-ROOMS = ("model", "fixtures", "reference_cpu", "gpu", "oracles", "harness", "report", "property_tests", "tuning", "benchmarks",
+FOLDERS = ("model", "fixtures", "reference_cpu", "gpu", "oracles", "harness", "report", "property_tests", "tuning", "benchmarks",
          "cli", "tests", "ci", "docs", "cmake")
 CODE = (".h", ".cpp", ".cu", ".cuh", ".py", ".sh", ".cmake", ".slurm", ".yml")
 FILES = r"(?:h|cuh|cpp|cu|py|sh|md|json|cmake|svg|png|patch|slurm|yml)"
 # Counterexamples, inputs and results are records of what was said when they were made; the self-test below is full of
 # what must not be found.
-RECORDS = ("fixtures/regressions/*.json", "fixtures/regressions/inputs/*", "docs/results/*.json", "ci/check_docs.py")
+RECORDS = ("fixtures/regressions/*.json", "fixtures/regressions/inputs/*", "results/*.json", "docs/results/*.json",
+           "ci/check_docs.py")
 # A word that the glossary has replaced, and what it says instead.
 OLD_WORDS = {r"planted[ _]faults?": "mutant, mutation testing", r"two_runs": "relations",
              r"time-?tables?": "schedule", r"shadow runs?": "free-running", r"so manieth": "every n-th"}
+# The same in the prose of pages alone: code may have a variable or a C++ term of that name.
+OLD_PROSE = {r"verbs?": "subcommand", r"simplified (?:counterexamples?|cases?)": "shrunk", r"alarms?": "false positive",
+             r"places? of rest": "fixed point", r"undecidable": "inconclusive", r"holders?": "containing clusters",
+             r"rooms": "modules or folders", r"whoever": "name the subject", r"tried and dropped": "decisions.md lists decisions"}
+SENTENCE = 40  # words at most
 # Made by scripts: ci/gpu_kit.sh.
 MADE = {"fixtures/scenes/kidney_1000_frames.json"}
 # Options in backticks that belong to compilers, linkers and other tools.
 OTHERS_OPTIONS = {"--fmad", "--wrap", "--preset", "--gtest_filter", "--gtest_fail_fast"}
-PLACEHOLDER = re.compile(r"\b(?:NAME|TARGET|SUITE|VERB|CASE|SCENE|ROOM|STAGE)\b|NN(?=_)")
+PLACEHOLDER = re.compile(r"\b(?:NAME|TARGET|SUITE|SUBCOMMAND|CASE|SCENE|ROOM|STAGE)\b|NN(?=_)")
 
 
 class Tree:
@@ -128,6 +136,27 @@ class Flowing:
         return max(start for start in self.starts if start[0] <= offset)[1]
 
 
+def words(text):
+    return sum(1 for token in text.split() if any(letter.isalnum() for letter in token))
+
+
+def sentences(text):
+    """The sentences of a page, outside of code and tables, each with the line in which it begins. Code in a line counts
+    as one word, and of a link its text. A heading, an item of a list and a row of a table end a sentence."""
+    blank = lambda match: re.sub(r"[^\n]", " ", match.group())  # noqa: E731
+    prose = re.sub(r"(?ms)^ *```.*?^ *```", blank, text)
+    prose = re.sub(r"(?m)^\|.*$", "", prose)
+    prose = re.sub(r"(?m)(?<=\n\n)(?: {4}(?![-*\d]).*\n)+", blank, prose)
+    prose = re.sub(r"``.+?``|`[^`]*`", lambda match: "code" + "\n" * match.group().count("\n"), prose)
+    prose = re.sub(r"\]\([^)\s]*\)", "]", prose)
+    at = 0
+    for end in re.finditer(r"[.!?][\"”’)\]*_]*(?=\s)|\n(?=\s*(?:\n|[-*] |\d+\. |#|>|<))|(?<=\n)#.*\n|\Z", prose):
+        sentence = prose[at:end.end()]
+        if words(sentence):
+            yield 1 + prose.count("\n", 0, at + len(sentence) - len(sentence.lstrip())), sentence.strip()
+        at = end.end()
+
+
 class Check:
     def __init__(self, root, program=None):
         self.tree = Tree(root)
@@ -146,9 +175,12 @@ class Check:
             self.old_words(file, text)
             if is_page:
                 self.page(file, text)
+                self.prose(file, text)
+                self.hashes(file, text)
             self.references(file, text)
             if not is_page:
                 self.paths(file, text)
+        self.budgets()
         return self.problems
 
     def report(self, file, line, problem):
@@ -191,8 +223,8 @@ class Check:
                 self.report(file, line, f"{name} has no section '{words}'")
 
     def paths(self, file, text):
-        rooms = "|".join(ROOMS)
-        for found in re.finditer(rf"(?<![\w/.$}}*-])((?:{rooms})/[\w./*-]*\.{FILES})\b", text):
+        folders = "|".join(FOLDERS)
+        for found in re.finditer(rf"(?<![\w/.$}}*-])((?:{folders})/[\w./*-]*\.{FILES})\b", text):
             path = found.group(1)
             if path not in MADE and not path.endswith(".md") and not self.tree.has(PLACEHOLDER.sub("*", path)):
                 self.report(file, text.count("\n", 0, found.start()) + 1, f"there is no {path}")
@@ -217,6 +249,44 @@ class Check:
             for line in re.finditer(r"(?m)^ *(?:\$ )?(?:[A-Z_]+=\S+ )?(?:\S*/)?(cutproof [^\n#]*)", joined):
                 self.command(file, line_of(begin + line.start()), line.group(1))
 
+    def prose(self, file, text):
+        for line, sentence in sentences(text):
+            if words(sentence) > SENTENCE:
+                self.report(file, line, f"a sentence of {words(sentence)} words: '{' '.join(sentence.split()[:6])} …'")
+            for word, instead in OLD_PROSE.items():
+                found = re.search(rf"(?i)(?<![\w-]){word}(?![\w-])", sentence)
+                if found:
+                    self.report(file, line, f"'{found.group()}' is an old word: {instead}")
+
+    def hashes(self, file, text):
+        for found in re.finditer(r"(?<![\w.+-])(?!\d+e\d*\b)(?=[0-9]*[a-f])(?=[a-f]*[0-9])[0-9a-f]{7,40}\b", text):
+            self.report(file, text.count("\n", 0, found.start()) + 1, f"'{found.group()}' is the hash of a commit")
+
+    def budgets(self):
+        """Pages that have no budget, budgets without a page, and pages that have more words than they may."""
+        listed = "docs/budgets.json"
+        if listed not in self.tree.files:
+            return self.report(listed, 1, "there is no such file")
+        given = json.loads(self.tree.text(listed))
+        pages = {file for file in self.tree.files if file.endswith(".md") and (file.startswith("docs/") or "/" not in file)}
+        named, total = set(), 0
+        for budget in given["budgets"]:
+            named |= set(budget["pages"])
+            for page in budget["pages"]:
+                if page not in pages:
+                    self.report(page, 1, f"there is no such page, and {listed} has a budget for it")
+            counted = sum(words(self.tree.text(page)) for page in budget["pages"] if page in pages)
+            total += counted
+            if counted > budget["words"]:
+                self.report(budget["pages"][0], 1, f"{counted} words, {budget['words']} at most" +
+                            (f" with {', '.join(budget['pages'][1:])}" if len(budget["pages"]) > 1 else ""))
+        for page in sorted(pages - named):
+            self.report(page, 1, f"{listed} has no budget for this page")
+        if sum(budget["words"] for budget in given["budgets"]) > given["total"]:
+            self.report(listed, 1, f"budgets add up to more than {given['total']} words")
+        if total > given["total"] - given["kept"]:
+            self.report(listed, 1, f"{total} words in all, {given['total']} at most, of which {given['kept']} are kept")
+
     def link(self, file, line, target):
         if re.match(r"[a-z]+:", target):
             return
@@ -229,18 +299,18 @@ class Check:
 
     def backticked(self, file, line, text):
         path = PLACEHOLDER.sub("*", text)
-        if re.fullmatch(rf"(?:{'|'.join(ROOMS)})/[\w./*-]*", path):
+        if re.fullmatch(rf"(?:{'|'.join(FOLDERS)})/[\w./*-]*", path):
             if not self.tree.has(path):
                 self.report(file, line, f"there is no {text}")
         elif re.fullmatch(r"(?:cpu|h200)_[\w*]+\.json", path):
-            if not self.tree.has("docs/results/" + path):
-                self.report(file, line, f"there is no docs/results/{text}")
+            if not self.tree.has("results/" + path):
+                self.report(file, line, f"there is no results/{text}")
         elif re.fullmatch(rf"[\w*-]+\.(?:h|cuh|cpp|cu|py|sh)", path):
             if not any(fnmatch.fnmatchcase(name, path) for name in self.tree.by_name):
                 self.report(file, line, f"there is no file {text}")
         elif self.commands:
             command = re.sub(r"^(?:[A-Z_]+=\S+ )", "", text)
-            if command.startswith("cutproof ") or command.split(" ")[0] in self.commands.verbs:
+            if command.startswith("cutproof ") or command.split(" ")[0] in self.commands.subcommands:
                 self.command(file, line, command)
             elif re.match(r"--[a-z]", command):
                 option = re.match(r"--[\w-]+", command).group()
@@ -263,20 +333,20 @@ class Commands:
         self.program = program
         self.options = {}
         top = self.help()
-        self.verbs = self.subcommands(top)
-        self.suites = self.subcommands(self.help("bench")) if "bench" in self.verbs else []
+        self.subcommands = self.subcommands_in(top)
+        self.suites = self.subcommands_in(self.help("bench")) if "bench" in self.subcommands else []
         self.options[()] = self.options_in(top)
-        for verb in self.verbs:
-            self.options[(verb,)] = self.options_in(self.help(verb))
+        for subcommand in self.subcommands:
+            self.options[(subcommand,)] = self.options_in(self.help(subcommand))
         for suite in self.suites:
             self.options[("bench", suite)] = self.options_in(self.help("bench", suite))
         self.all_options = set().union(*self.options.values())
 
-    def help(self, *verb):
-        return subprocess.run([self.program, *verb, "--help"], check=True, capture_output=True, text=True).stdout
+    def help(self, *subcommand):
+        return subprocess.run([self.program, *subcommand, "--help"], check=True, capture_output=True, text=True).stdout
 
     @staticmethod
-    def subcommands(text):
+    def subcommands_in(text):
         return re.findall(r"(?m)^  ([a-z_-]+)  ", text.partition("Subcommands:")[2])
 
     @staticmethod
@@ -292,8 +362,8 @@ class Commands:
             words = words[1:]
         if not words or words[0].startswith("-"):
             who, rest = (), words
-        elif words[0] not in self.verbs:
-            yield f"there is no verb '{words[0]}'"
+        elif words[0] not in self.subcommands:
+            yield f"there is no subcommand '{words[0]}'"
             return
         elif words[0] == "bench" and len(words) > 1 and re.fullmatch(r"[a-z_]+", words[1]):
             if words[1] not in self.suites:
@@ -322,7 +392,11 @@ SOUND = {
     "model/judge.cpp": '#include "model/state.h"\nconst char* kSource = "method.md §1, "\n    "I1";\n',
     "ci/test.sh": "# model/state.h says what is tested\n",
     "fixtures/scenes/a.json": '{"description": "as method.md §2 has it"}\n',
+    "docs/budgets.json": json.dumps({"total": 200, "kept": 50, "budgets": [
+        {"words": 40, "pages": ["README.md"]}, {"words": 90, "pages": ["docs/method.md", "docs/tolerances.md"]}]}),
 }
+LONG = "So it goes" + " on" * 38 + "."  # 41 words
+FORTY = "x " * 40
 # What is put into a file in place of what, and what must be said.
 BROKEN = [
     ("README.md", "docs/method.md#", "docs/methods.md#", "leads nowhere"),
@@ -330,7 +404,7 @@ BROKEN = [
     ("README.md", "`model/state.h`", "`model/stat.h`", "there is no model/stat.h"),
     ("README.md", "scenes/*.json", "scenes/*.yaml", "there is no fixtures/scenes/*.yaml"),
     ("README.md", "# Project", "# Planted faults", "old word"),
-    ("README.md", "cutproof run fix", "cutproof walk fix", "no verb 'walk'"),
+    ("README.md", "cutproof run fix", "cutproof walk fix", "no subcommand 'walk'"),
     ("README.md", "a.json --check", "a.json --chek", "no option --chek"),
     ("README.md", "bench solver", "bench sloth", "no suite 'sloth'"),
     ("README.md", "--json F", "--jsn F", "no option --jsn"),
@@ -348,6 +422,26 @@ BROKEN = [
     ("model/judge.cpp", "const", "// the timetable\nconst", "old word"),
     ("ci/test.sh", "model/state.h", "model/gone.h", "there is no model/gone.h"),
     ("fixtures/scenes/a.json", "§2", "§4", "no section 4"),
+    ("docs/method.md", "Next:", LONG + " Next:", "a sentence of 41 words: 'So it goes on on on …'"),
+    ("docs/method.md", "Next:", "- " + LONG + "\n\nNext:", "a sentence of 41 words"),
+    ("docs/method.md", "Next:", LONG.replace("goes", "[goes](#method)") + "\nNext:", "a sentence of 41 words"),
+    ("docs/method.md", "Next:", "Each verb has an option. Next:", "'verb' is an old word: subcommand"),
+    ("docs/method.md", "Next:", "At 4ead544f it was so. Next:", "'4ead544f' is the hash of a commit"),
+    ("docs/method.md", "## 2. Blade\n", "## 2. Blade\n\n```\na2faf60\n```\n", "'a2faf60' is the hash of a commit"),
+    ("README.md", "See ", "| a |\n|---|\n| " + FORTY + " |\n\nSee ", "words, 40 at most"),
+    ("docs/method.md", "Next:", (FORTY + ".\n\n") * 2 + "Next:", "words, 90 at most with docs/tolerances.md"),
+    ("docs/budgets.json", '["README.md"]', '["README.md", "docs/guide.md"]', "there is no such page"),
+    ("docs/budgets.json", ', "docs/tolerances.md"', "", "has no budget for this page"),
+    ("docs/budgets.json", "200", "120", "add up to more than 120"),
+    ("docs/budgets.json", "50", "190", "words in all, 200 at most, of which 190 are kept"),
+]
+# What must not be taken for any of that.
+HARMLESS = [
+    ("docs/method.md", "Next:", "```\n" + FORTY + "x\n```\n\nNext:"),
+    ("docs/method.md", "Next:", "| a |\n|---|\n| " + FORTY + "x |\n\nNext:"),
+    ("docs/method.md", "Next:", FORTY.strip() + ".\nNext:"),
+    ("docs/method.md", "Next:", "- " + "x " * 30 + "\n- " + "x " * 30 + "\n\nNext:"),
+    ("docs/method.md", "Next:", "`verb` and 0x5a5a5a5a1 take 1234567 bytes, less than 1.8446744073709552e19. Next:"),
 ]
 PROGRAM = """#!/bin/sh
 case "$*" in
@@ -379,11 +473,13 @@ def self_test():
         wrong += [f"sound, but: {problem}" for problem in problems()]
         for change in BROKEN:
             found = problems(change)
-            if len(found) != 1 or change[3] not in found[0] or not found[0].startswith(change[0] + ":"):
+            if len(found) != 1 or change[3] not in found[0] or \
+                    not found[0].startswith((change[0] + ":", "docs/" if "budgets" in change[0] else change[0] + ":")):
                 wrong.append(f"{change[0]}, '{change[1]}' -> '{change[2]}': found {found}, wanted '{change[3]}'")
+        wrong += [f"harmless, but: {problem}" for change in HARMLESS for problem in problems(change)]
     for line in wrong:
         print(line)
-    print(f"{len(BROKEN)} broken references, {'all found' if not wrong else 'SELF-TEST FAILS'}")
+    print(f"{len(BROKEN)} broken pages and references, {'all found' if not wrong else 'SELF-TEST FAILS'}")
     return 1 if wrong else 0
 
 
@@ -391,7 +487,7 @@ def main():
     parser = argparse.ArgumentParser(description="Checks that what pages and code refer to exists.")
     parser.add_argument("--program", metavar="CUTPROOF", help="check command lines against its --help")
     parser.add_argument("--root", default=pathlib.Path(__file__).resolve().parent.parent)
-    parser.add_argument("--self-test", action="store_true", help="whether broken references are found")
+    parser.add_argument("--self-test", action="store_true", help="whether everything that is wrong is found")
     options = parser.parse_args()
     if options.self_test:
         return self_test()
@@ -404,7 +500,7 @@ def main():
         print(f"there are no pages in {options.root}")
         return 1
     print(f"{pages} pages and what refers to them: " +
-          (f"{len(problems)} problems" if problems else "everything that is named exists"))
+          (f"{len(problems)} problems" if problems else "nothing wrong"))
     return 1 if problems else 0
 
 
