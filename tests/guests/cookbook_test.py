@@ -1,5 +1,7 @@
-"""docs/cookbook.md, word by word: its programs and commands in an empty folder, and what it says that they print. Its
-table has a row for each property of a run. Usage: cookbook_test.py SOURCES CUTPROOF WORK"""
+"""docs/cookbook.md, word by word: its programs and commands in an empty folder, and what it says that they print. A
+program that needs a library which is not installed is skipped, by name. The table has a row for each property of a run.
+Usage: cookbook_test.py SOURCES CUTPROOF WORK"""
+import importlib.util
 import os
 import pathlib
 import re
@@ -26,9 +28,24 @@ def own_lines(code):
     return ["import cutproof_run", *lines[begin:]]
 
 
+def judge_kernel(code):
+    """A program that needs no run: cutproof.judge raises if a verdict fails."""
+    for library in re.findall(r"^import (\w+)$", code, re.M):
+        if library != "cutproof" and not importlib.util.find_spec(library):
+            print(f"SKIPPED: the program that imports {library}, which is not installed")
+            return
+    shutil.rmtree(work, ignore_errors=True)
+    work.mkdir(parents=True)
+    shutil.copy(sources / "guests/python/cutproof.py", work)
+    (work / "kernel.py").write_text(code)
+    subprocess.run([sys.executable, "-B", "kernel.py"], cwd=work, env=environment, check=True, timeout=300)
+
+
 output, wanted, programs, red = "", 0, 0, 0
 for kind, block in re.findall(r"^```(python|sh|text)\n(.*?)^```", page, re.S | re.M):
-    if kind == "python":
+    if kind == "python" and "cutproof_run" not in block:
+        judge_kernel(block)
+    elif kind == "python":
         assert len(own_lines(block)) <= 15, f"{len(own_lines(block))} lines write the run:\n{block}"
         shutil.rmtree(work, ignore_errors=True)
         work.mkdir(parents=True)
