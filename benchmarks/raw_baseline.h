@@ -1,5 +1,5 @@
 // Kernels that are written twice, against DeviceBlock and as plain CUDA, to show that the launch layer costs nothing
-// (docs/design/architecture.md, Kernels): registers and time within 2 %.
+// (docs/design/kernels.md, Blocks): registers and time within 2 %.
 #pragma once
 #include <string>
 #include <vector>

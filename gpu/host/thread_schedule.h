@@ -1,4 +1,4 @@
-// Who runs next when kernels are executed under a simulated schedule (docs/design/architecture.md, Kernels;
+// Who runs next when kernels are executed under a simulated schedule (docs/design/kernels.md, Blocks;
 // architecture.md, Schedules). Threads of a launch are numbered place · 32 + thread, where place is that of a
 // block among the blocks that are alive at once.
 //

@@ -1,4 +1,4 @@
-// What a kernel sees of the machine (docs/design/architecture.md, Kernels). Every kernel is one function template
+// What a kernel sees of the machine (docs/design/kernels.md, Blocks). Every kernel is one function template
 //
 //   template <class Block> CUTPROOF_DEVICE void verb_noun_kernel(Block& block, DeviceView view, ...);
 //
