@@ -1,5 +1,5 @@
-// Kernels that are written twice, against DeviceBlock and as plain CUDA, to show that the launch layer costs nothing
-// (docs/design/kernels.md, Blocks): registers and time within 2 %.
+// Kernels that are written twice, against DeviceBlock and as plain CUDA, to show what the launch layer costs
+// (docs/design/kernels.md, Blocks).
 #pragma once
 #include <string>
 #include <vector>

@@ -88,8 +88,8 @@ struct Wall {
 // (method.md §11) [h]: one that lies on a wall exactly must not do one thing or another as rounding has it.
 inline constexpr double kTouchMargin = 0x1p-10;
 
-// Where blade and walls are projected in turn, a place is refused if it is worse than the present one by more than so
-// many roundings of what is compared and of the present place (decisions.md, Contacts with the blade).
+// Where blade and walls are projected in turn, a place is refused if it is worse than the present one by more than this
+// many roundings of what is compared and of the present place (method.md §3).
 inline constexpr double kRefusalRoundings = 64;
 
 // Whether two walls face each other with no room between them: then nothing is allowed anywhere.

@@ -10,7 +10,7 @@
 namespace cutproof::oracles {
 namespace {
 
-// How often blade and walls are projected in turn where both hold (decisions.md, Contacts with the blade).
+// How often blade and walls are projected in turn where both hold (method.md §3).
 constexpr int kTurns = 16;
 
 double length_of(Local c) { return std::hypot(c.u, c.n, c.w); }

@@ -1,5 +1,5 @@
-// Where blade and walls let one particle be within one substep (method.md §3, Blade; decisions.md, Contacts with the
-// blade), written a second time: no line is shared with a backend. Internal to oracles/.
+// Where blade and walls let one particle be within one substep (method.md §3), written a second time: no line is shared
+// with a backend. Internal to oracles/.
 #pragma once
 #include <limits>
 #include <vector>

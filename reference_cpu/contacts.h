@@ -1,4 +1,4 @@
-// Contacts of one particle with the blade and the walls within one substep (method.md §3, Blade; decisions.md).
+// Contacts of one particle with the blade and the walls within one substep (method.md §3).
 #pragma once
 #include "model/setup.h"
 

@@ -116,7 +116,7 @@ def by_singular_values(moment, previous):
 
 
 class Blade:
-    """A plate in one substep: poses before and after (edge, along, back), method.md §3, Blade; decisions.md, Contacts."""
+    """A plate in one substep: poses before and after (edge, along, back), method.md §3."""
 
     def __init__(self, setup, before, after):
         self.half, self.depth, self.friction = setup.blade_length / 2, setup.blade_depth, setup.blade_friction

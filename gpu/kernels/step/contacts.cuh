@@ -1,5 +1,5 @@
-// Contacts of one particle with the blade and the walls within one substep (method.md §3, Blade;
-// docs/design/decisions.md, Contacts with the blade). Everything works on displacements from rest. A distance to the
+// Contacts of one particle with the blade and the walls within one substep (method.md §3).
+// Everything works on displacements from rest. A distance to the
 // blade is (X - edge) + d, with X - edge formed once and rounded once, and a projection is added to d. So a particle
 // far from the body's origin loses no more than that one rounding.
 #pragma once

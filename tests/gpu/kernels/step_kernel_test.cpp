@@ -192,8 +192,7 @@ TEST(GpuStep, MeetsTheReferenceWithinItsRounding) {
       setup.step.damping = below(3);
       setup.step.gravity = {0.1, 0, -9.81};
       // Nothing, the blade, walls, and all at once with friction. Not all at once without: the two sides would accept
-      // or refuse a point between blade and wall (docs/design/decisions.md) by comparing distances that differ by
-      // rounding.
+      // or refuse a point between blade and wall (method.md §3) by comparing distances that differ by rounding.
       const int kind = trial % 4;
       if (kind > 0) add_contacts(setup, kind == 3 ? 0.4 : 0.0, random);
       if (kind == 1) setup.walls.clear();
