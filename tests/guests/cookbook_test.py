@@ -83,4 +83,8 @@ def rows(text, after):
 
 properties = rows((sources / "docs/reference/oracles.md").read_text(), "## A run of any simulator")
 assert rows(page, "## Verdict, likely cause, first check") == properties, "the table does not list the properties of a run"
-print(f"{programs} programs and {len(properties)} rows are true")
+registry = (sources / "oracles/registry.cpp").read_text()
+named = [name for row in rows(page, "Of states and stages") for name in row.split(", ")]
+unknown = [name for name in named if f'("{name}"' not in registry]
+assert not unknown, f"there are no properties {unknown}"
+print(f"{programs} programs and {len(properties)} rows are true, {len(named)} properties of states and stages are there")
