@@ -19,9 +19,9 @@ There is one copy (build/mutation_testing/tree) with one build folder, without C
 command that is used. Then for each mutant: patch, build what its suspects need, run them until one finds it; if none
 does, the tests of its stage, the properties, and five minutes of `cutproof fuzz`; for one of the judge the tests of the
 folders that it patches, because a campaign on right programs is silent about a judge that accepts too much. A mutant
-that does not apply or does not compile is an error, not a find. Writes docs/results/mutation_testing.md unless --only
-or --shard is given. Exit status: 0 every mutant was found, 1 one was not or the unchanged code fails, 2 bad usage or a
-bad patch.
+that does not apply or does not compile is an error, not a find. Writes results/mutation_testing.json and the tables of
+its page (ci/results.sh) unless --only or --shard is given. Exit status: 0 every mutant was found, 1 one was not or the
+unchanged code fails, 2 bad usage or a bad patch.
 """
 import argparse
 import contextlib
@@ -42,7 +42,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 WORK = ROOT / "build" / "mutation_testing"
 TREE, BUILD, RUN = WORK / "tree", WORK / "build", WORK / "run"
-TABLE = ROOT / "docs" / "results" / "mutation_testing.md"
+TABLE = ROOT / "results" / "mutation_testing.json"
 STAGES = ("step", "detect", "split", "merge", "expand", "skin", "launch", "judge")
 # What a mutant may patch: simulators, and with the stage `judge` all that says whether they are right. The tests of the
 # latter, for where suspects find nothing; without those that take minutes.
@@ -67,7 +67,7 @@ ALONE = {
     "moving cases": [f"fuzz --dynamics --cases 2000 --seed 1 --simplify 0 --save {RUN}"],
     "scenes": [f"run fixtures/scenes/{scene}.json --check" for scene in ("three_cuts", "cuboid_press", "small_block")],
 }
-ALONE_FORMAT, ALONE_TITLE = "cutproof.mutants_alone", "What campaigns and scenes find alone"
+ALONE_FORMAT = "cutproof.mutants_alone"
 MOST_SECONDS = 420  # of one command
 FUZZ_SECONDS = 300  # of the last resort
 FUZZ_FAILS = re.compile(r"case (\d+) FAILS: '(.*?)' fails after")
@@ -382,59 +382,39 @@ def simplicity(rows):
             f"{'has' if simple == 1 else 'have'} at most {MOST_STROKES} strokes and {MOST_PARTICLES} particles.")
 
 
+def read_table():
+    """The table as it stands; what a run does not make stays in it."""
+    return json.loads(TABLE.read_text()) if TABLE.exists() else {"rows": [], "alone": None, "hours": 0}
+
+
+def write_document(hours, rows, alone):
+    """One line for each mutant; the tables of the page are made of it."""
+    head = {"format": "cutproof.mutants", "format_version": 1, "hours": round(hours, 1), "stages": STAGES, "alone": alone}
+    lines = [f" {json.dumps(key)}: {json.dumps(value)}," for key, value in head.items()]
+    lines += [' "rows": [', ",\n".join("  " + json.dumps(row, ensure_ascii=False) for row in rows), " ]"]
+    TABLE.write_text("\n".join(["{", *lines, "}"]) + "\n")
+    subprocess.run([ROOT / "ci" / "results.sh"], check=True)
+
+
 def write_alone(by_itself):
-    """Puts the section of --alone into the table's page, counts by stage of those asked; what else stands there stays."""
+    """Puts what --alone has found into the table: for each stage of those asked [found, asked] by each of ALONE and by any."""
     stages = {name: read_mutant(HERE / "mutants" / f"{name}.patch").stage for name in by_itself}
-    lines = ["## " + ALONE_TITLE, "",
-             "Without this project's tests: " + "; ".join(f"*{name}*: " + ", ".join(
-                 f"`cutproof {command.split(' --simplify')[0]}`" for command in commands)
-                                                         for name, commands in ALONE.items())
-             + "; on each backend that the mutant changes.", "",
-             "| stage | " + " | ".join(ALONE) + " | any of them |", "|---|" + "---|" * (len(ALONE) + 1)]
+    counts = {}
     for stage in (*STAGES, "all"):
         of_stage = [found for name, found in by_itself.items() if stage in (stages[name], "all")]
         if of_stage:
             asked = [[found[name] for found in of_stage if name in found] for name in ALONE]
-            counts = [f"{sum(map(bool, answers))} of {len(answers)}" for answers in asked]
-            counts.append(f"{sum(any(found.values()) for found in of_stage)} of {len(of_stage)}")
-            lines.append(f"| {stage} | " + " | ".join(counts) + " |")
+            counts[stage] = [[sum(map(bool, answers)), len(answers)] for answers in asked]
+            counts[stage].append([sum(any(found.values()) for found in of_stage), len(of_stage)])
     missed = [name for name in sorted(by_itself) if not any(by_itself[name].values())]
-    section = "\n".join(lines + ["", f"None of them finds: {', '.join(missed) or 'no mutant'}."]) + "\n\n"
-    head, *sections = sections_of_table()
-    TABLE.write_text(head + section + "".join(s for s in sections if ALONE_TITLE not in s))
-
-
-def sections_of_table():
-    return re.split(r"^(?=## )", TABLE.read_text(), flags=re.MULTILINE)
+    before = read_table()
+    write_document(before["hours"], before["rows"], {"columns": list(ALONE), "stages": counts, "missed": missed})
 
 
 def write_table(rows):
-    lines = [
-        "# Mutation testing",
-        "",
-        "Written by `ci/mutation_testing/run.py`. Each mutant is a patch, whose head says what is wrong with the program"
-        " ([how it works](../design/architecture.md#mutation-testing)). A run stops at the first find and begins with the"
-        " suspected property. *Took*: cases of a random property or campaign until the find, schedules of a simulated"
-        " machine, or a unit test. *Counterexample*: what `cutproof fuzz` has made of the case that it found.",
-        "",
-        f"{sum(1 for row in rows if row['found'])} of {len(rows)} found, in"
-        f" {sum(row['seconds'] for row in rows) / 3600:.1f} hours of one copy. {simplicity(rows)}",
-    ]
-    # What a run of --alone has made stays.
-    lines += ["", *(section.strip() for section in sections_of_table() if ALONE_TITLE in section)]
-    for stage in STAGES:
-        of_stage = [row for row in rows if row["stage"] == stage]
-        if not of_stage:
-            continue
-        lines += ["", f"## {stage}", "", "| mutant | found by | took | counterexample |", "|---|---|---|---|"]
-        for row in of_stage:
-            by = row["by"] if row["found"] else "**not found**"
-            size = (f"{plural(row['strokes'], 'stroke')}, {plural(row['particles'], 'particle')}"
-                    if row["strokes"] is not None else "")
-            patch = f"[{row['name']}](../../ci/mutation_testing/mutants/{row['name']}.patch)"
-            cells = [patch, by, row["took"], size]
-            lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
-    TABLE.write_text("\n".join(lines) + "\n")
+    kept = ("name", "stage", "found", "by", "took", "strokes", "particles")
+    write_document(sum(row["seconds"] for row in rows) / 3600, [{key: row[key] for key in kept} for row in rows],
+                   read_table()["alone"])
 
 
 def merge(files):

@@ -1,0 +1,493 @@
+#!/usr/bin/env python3
+"""Makes the tables of docs/results/*.md from the documents in results/.
+
+Usage: results.py                        writes every table between `<!-- results: NAME -->` and `<!-- end -->`
+       results.py --check                whether pages and documents agree; writes nothing
+       results.py --fronts TUNE.json...  makes results/h200_fronts.json, an extract of documents of `cutproof tune --full`
+       results.py --self-test            whether --check finds a changed figure, a missing table and a document not cited
+
+--check further asks that every document is cited by a page or read by a table or a picture, that every cited document
+exists, and that all of them together have 2 MB at most. Exit status: 0 yes, 1 no, 2 bad usage or a missing document.
+"""
+import argparse
+import json
+import pathlib
+import re
+import shutil
+import statistics
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+MOST_BYTES = 2_000_000
+MARKED = re.compile(r"<!-- results: (\w+) -->\n(.*?)<!-- end -->", re.DOTALL)
+CUT_SCENES = ("small_block", "kidney_arc", "kidney_discontinuous", "three_cuts", "liver_cut", "cuboid_press")
+TORN = 3  # h; a Hausdorff distance beyond this means that tissue tore elsewhere than along the cut
+
+
+class Documents:
+    """The stored results, each read once; `read` says which."""
+
+    def __init__(self, root):
+        self.folder = root / "results"
+        self.read = {}
+
+    def __call__(self, name):
+        if name not in self.read:
+            try:
+                self.read[name] = json.loads((self.folder / f"{name}.json").read_text(encoding="utf-8"))
+            except (OSError, ValueError) as error:
+                raise SystemExit(f"results: {error}")
+        return self.read[name]
+
+
+# --- Figures ---------------------------------------------------------------------------------------------------------
+
+def figure(value, digits=2):
+    """A number to so many digits; small and great ones with an exponent."""
+    if value is None or value in ("inf", float("inf")):
+        return "–"
+    if value == 0:
+        return "0"
+    text = f"{value:.{digits}g}"
+    if 1e-4 <= abs(value) < 10 ** digits:
+        places = max(0, digits - 1 - int(text.split("e")[1]) if "e" in text else digits)
+        return text if "e" not in text else f"{value:.{places}f}"
+    if abs(value) >= 10 ** digits:
+        return f"{float(text):,.0f}"
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    return f"{mantissa}e{int(exponent)}"
+
+
+def milliseconds(seconds):
+    """The median of a time, in ms."""
+    if seconds is None:
+        return "–"
+    return f"{seconds['median'] * 1e3:.{3 if seconds['median'] < 1e-3 else 2}f}"
+
+
+def span(values, digits=2):
+    low, high = f"{min(values):.{digits}f}", f"{max(values):.{digits}f}"
+    return low if low == high else f"{low} to {high}"
+
+
+def percent(part, whole):
+    return f"{100 * part / whole:.2g} %"
+
+
+def table(head, rows):
+    for row in rows:
+        assert len(row) == len(head), (head, row)
+    return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in (head, ["---"] * len(head), *rows))
+
+
+def scene_of(document):
+    return document["scene"].rsplit("/", 1)[-1].removesuffix(".json")
+
+
+def step_error(row):
+    return row["error"]["max_h"]
+
+
+# --- README.md -------------------------------------------------------------------------------------------------------
+
+def status(read):
+    rows = []
+    for name, where in (("h200_fuzz_million", "H200"), ("h200_fuzz_dynamics", "H200"), ("cpu_fuzz_host", "2 CPU cores"),
+                        ("cpu_fuzz_dynamics_host", "2 CPU cores")):
+        one = read(name)
+        devices = one.get("devices") or [0]
+        rows.append([f"random {'moving cases' if one['dynamics'] else 'dissections'}",
+                     f"`cutproof fuzz --backend {one['backend']}{' --dynamics' if one['dynamics'] else ''} "
+                     f"--cases {one['cases_asked']} --seed {one['seed']}`",
+                     where if len(devices) == 1 else f"{len(devices)} {where}",
+                     f"{len(one['violations'])} violations in {one['verdicts']:,} verdicts; {one['seconds']:.0f} s"])
+    kit = read("h200_kit_summary")
+    steps = kit["steps"]
+    bad = [step["name"] for step in steps if step["status"]]
+    scenes = sum(step["name"].startswith("scene_") for step in steps)
+    tools = sum(step["name"].startswith("sanitizer_") for step in steps)
+    rows.append([f"{scenes} checked scenes, primitives, refused CUDA calls, properties, same bits twice, {tools} runs of "
+                 "compute-sanitizer", "`ci/gpu_kit.sh`", "H200",
+                 f"{len(steps) - len(bad)} of {len(steps)} steps pass" + (f"; not {', '.join(bad)}" if bad else "")])
+    lockstep = read("cpu_lockstep_host")["scenes"]
+    differing = sum(one["topology_differences"] for one in lockstep)
+    rows.append([f"lockstep with the reference, {len(lockstep)} scenes, {sum(one['frames'] for one in lockstep)} frames",
+                 "`cutproof run SCENE --backend host --against reference`", "2 CPU cores",
+                 f"{differing} topology differences; positions within "
+                 f"{figure(max(one['greatest']['position']['max'] for one in lockstep))} h"])
+    solved = read("h200_solver_every_frame")["scenes"]
+    rows.append(["substeps solved independently", "`cutproof run SCENE --backend gpu --errors solver`", "H200",
+                 f"{sum(one['converged'] for one in solved)} of {sum(one['frames'] for one in solved)} frames have a solution"])
+    fronts = read("h200_fronts")["fronts"]
+    rows.append([f"error against time, {sum(not one['retardation'] for one in fronts)} scenes",
+                 "`cutproof tune SCENE --full --reference substeps`", "H200", "[front](accuracy.md#the-front-on-an-h200)"])
+    campaigns = [row for row in read("h200_campaigns")["rows"] if row["backend"] == "gpu"]
+    rows.append(["cases a second", "`cutproof bench campaigns --backend gpu`", "H200",
+                 "; ".join(f"{row['campaign']} {figure(row['cases_per_second'])}" for row in campaigns)])
+    seen = read("h200_sensitivity")
+    goals = [row for row in seen["rows"] if row["within_goal"] is not None and row["stage"] not in ("detect",)
+             and row["property"] != "untouched"]
+    rows.append(["least error rejected", "`cutproof bench sensitivity --backend gpu`", "H200",
+                 f"{sum(row['within_goal'] for row in goals)} of {len(goals)} goals met; "
+                 "[sensitivity](accuracy.md#sensitivity)"])
+    mutants = read("mutation_testing")["rows"]
+    rows.append(["mutants", "`ci/mutation_testing.sh`", "CPU",
+                 f"{sum(row['found'] for row in mutants)} of {len(mutants)} found; [by stage](mutation_testing.md)"])
+    return table(["what", "command", "on", "outcome"], rows)
+
+
+def table_1(read):
+    stages = {row["what"]: {} for row in read("h200_table_1")["rows"]}
+    for row in read("h200_table_1")["rows"]:
+        if row.get("split", "blocks") == "blocks":
+            stages[row["what"]][row["scene"], row["cooking"]] = row
+    bodies = {(one["scene"], one["cooking"]): one["body"] for one in read("h200_table_1")["scenes"]}
+    scenes = ("cuboid", "liver", "kidney")
+    both = lambda scene, what: " / ".join(what(scene, cooking) for cooking in ("boxes", "sampled"))  # noqa: E731
+    rows = [["particles"] + [cell for scene in scenes for cell in (
+        f"{bodies[scene, 'boxes']['particles']:,}", "101,096" if scene == "kidney" else "–")]]
+    rows.append(["clusters"] + [cell for scene in scenes for cell in (
+        both(scene, lambda s, c: f"{bodies[s, c]['clusters']}"), "795" if scene == "kidney" else "–")])
+    for what in ("step", "detect", "split", "merge", "expand", "skin", "frame"):
+        cells = [what]
+        for scene in scenes:
+            paper = stages[what][scene, "boxes"]["paper_seconds"]
+            cells += [both(scene, lambda s, c: milliseconds(stages[what][s, c]["seconds"])), f"{paper * 1e3:.2f}"]
+        rows.append(cells)
+    return table(["", "cuboid", "paper", "liver", "paper", "kidney", "paper"], rows)
+
+
+def fig_10(read):
+    document = read("cpu_clusters_host")
+    rows = []
+    for row in document["rows"]:
+        counts = row["clusters"]
+        rows.append(["no merging" if row["tau"] is None else f"τ = {row['tau']:g}" + (", default" if row["tau"] == 0.5 else ""),
+                     *(counts[frame] for frame in (0, 56, 64, 72, 80, 96)), f"{100 * row['growth']:+.1f} %"])
+    return table(["", "start", "frame 56", "64", "72", "80", "96", "growth"], rows)
+
+
+def sizes(read):
+    """Frames of a cut, plain and accelerated, and those of the paper's kidneys beside its own."""
+    rows = []
+    for document in (read("h200_stages_rooms"), read("h200_stages_10M_one_condition")):
+        found = {}
+        for row in document["rows"]:
+            if row["what"] in ("frame", "frame, cutting", "step"):
+                found.setdefault(row["particles"], {})[row["acceleration"], row["what"]] = row
+        memory = {}
+        for one in document["scenes"]:
+            memory.setdefault(one["body"]["particles"], one["bytes"])
+        for particles, of in found.items():
+            fast = of.get(("chebyshev", "frame, cutting"))
+            rows.append(["straight cut", f"{particles:,}", milliseconds(of["none", "frame, cutting"]["seconds"]),
+                         milliseconds(fast["seconds"]) if fast else "–", "–", figure(step_error(of["none", "step"])),
+                         f"{memory[particles] / 1e6:,.0f}"])
+    for row in sorted(read("h200_sampling")["rows"], key=lambda row: row["particles"]):
+        rows.append(["kidney of Table 2", f"{row['particles']:,}", "–", milliseconds(row["seconds"]["frame, cutting"]),
+                     f"{row['paper']['frame_seconds'] * 1e3:.4g}", figure(row["error"]["step"]["max_h"]), "–"])
+    return table(["body", "particles", "plain, ms", "Chebyshev, ms", "paper, ms", "error of a step, h", "MB"], rows)
+
+
+# --- accuracy.md -----------------------------------------------------------------------------------------------------
+
+def without_tears(read, remove):
+    return [run for run in read("h200_geometry")["runs"] if run["remove"] == remove and not run.get("changes")
+            and run["scene"] != "three_cuts" and run["hausdorff"] <= TORN]
+
+
+def errors(read):
+    random_steps = read("h200_fuzz_dynamics")["steps_compared"]
+    lockstep = read("cpu_lockstep_host")["scenes"]
+    solved = read("h200_solver_every_frame")["scenes"]
+    given = [one["as_given"]["rms_h"] for one in read("h200_fronts")["fronts"] if not one["retardation"]]
+    nearer = without_tears(read, "nearer")
+    limits = {scene: levels_of(read(f"cpu_tune_limit_{scene}")) for scene in CUT_SCENES}
+    last = [levels[-1]["apart_h"] for levels in limits.values()]
+    known = [read(f"cpu_tune_retarded_{scene}")["reference"]["known_h"] for scene in CUT_SCENES]
+    known = [value for value in known if value != "inf"]
+    total = random_steps["particles"] + random_steps["undecidable"]
+    return table(["error", "size", "depends on"], [
+        ["implementation: single precision beside the double-precision reference, one frame",
+         f"scenes: at most {figure(max(one['greatest']['position']['max'] for one in lockstep))} h; random cases: at most "
+         f"{figure(random_steps['greatest_h'])} h in {random_steps['steps']:,} steps, without the "
+         f"{percent(random_steps['undecidable'], total)} of positions that rounding can carry farther",
+         "stiffness, contacts"],
+        ["solver: a scene as given beside the same substeps solved",
+         f"one substep: {figure(min(one['rms_h'] for one in solved))} to {figure(max(one['rms_h'] for one in solved))} h RMS, "
+         f"{figure(max(one['max_h'] for one in solved))} h at worst; whole scene: {figure(min(given))} to "
+         f"{figure(max(given))} h RMS", "stiffness × dt², iterations"],
+        ["geometry: the skin of a cut beside the blade's path through the tissue, nearer end removed",
+         f"{span([run['skin_rms'] for run in nearer])} h RMS; {span([ratio(run) for run in nearer])} times the least tissue "
+         "that any removal can lose", "grid"],
+        ["time step: the limit of many substeps",
+         f"without retardation {span(last)} h between the last two levels; with it the limit is known to "
+         f"{figure(min(known))} to {figure(max(known))} h in {len(known)} of {len(CUT_SCENES)} cut scenes",
+         "dt, damping"],
+        ["model: another cluster size is another material", "not an error of the program", "cluster size"]])
+
+
+def ratio(run):
+    return run["lost_per_area"] / run["least_per_area"]
+
+
+def levels_of(document):
+    levels = (document.get("reference") or document["answer"])["levels"]
+    return [level for level in levels if level["apart_h"] is not None]
+
+
+def solver(read):
+    rows = []
+    for one in read("h200_solver")["scenes"]:
+        if one["substeps"] != 1:
+            continue
+        reached = {of["acceleration"]: of for of in one["to_tolerance"]}
+        rows.append([f"{one['scene'].split('_')[0]}, {one['particles']:,}", f"{one['stiffness']:.0e}".replace("e+0", "e"),
+                     *(f"{reached[which]['iterations']} in {reached[which]['seconds'] * 1e3:.3f} ms"
+                       for which in ("none", "chebyshev"))])
+    return table(["body, particles", "k, 1/s²", "plain iterations", "Chebyshev"], rows)
+
+
+def rotations(read):
+    rows = []
+    for one in read("h200_rotations")["methods"]:
+        if one["precision"] == "single":
+            rows.append([f"`{one['method']}`" + (", default" if one["default"] or one["method"] == "newton" else ""),
+                         figure(one["worst_gap"]), one["wrong"],
+                         *(figure(one[f"{which}_seconds_per_million"]["median"] * 1e3) for which in ("near", "cold"))])
+    return table(["method", "worst gap", "wrong", "near, ms", "cold, ms"], rows)
+
+
+def retardation(read):
+    rows = []
+    for scene in (*CUT_SCENES, "uniform_stretch"):
+        damped = read(f"cpu_tune_retarded_{scene}")["reference"]
+        apart = {level["substeps"]: level["apart_h"] for level in damped["levels"]}
+        plain = {}
+        if scene in CUT_SCENES:
+            plain = {level["substeps"]: level["apart_h"] for level in levels_of(read(f"cpu_tune_limit_{scene}"))}
+        shown = lambda value: figure(value) if isinstance(value, float) else "–"  # noqa: E731
+        rows.append([scene, *(shown(plain.get(level)) for level in (64, 128, 256)),
+                     *(shown(apart.get(level)) for level in (64, 128, 256, 512)),
+                     "not" if damped["known_h"] == "inf" else figure(damped["known_h"])])
+    return table(["scene", "64", "128", "256", "retarded: 64", "128", "256", "512", "known to"], rows)
+
+
+def front(read):
+    rows = []
+    for one in read("h200_fronts")["fronts"]:
+        given = one["as_given"]
+        cells = []
+        for tolerance in (0.5, 0.2, 0.05, 0.01):
+            within = next((point for point in one["front"] if point["tolerance_h"] == tolerance), None)
+            cells.append(f"{milliseconds(within['seconds_per_frame'])} ({steps_of(within)})" if within else "–")
+        rows.append([one["scene"] + (", retarded" if one["retardation"] else ""),
+                     f"{milliseconds(given['seconds_per_frame'])} ({steps_of(given)}): {figure(given['rms_h'])}", *cells])
+    return table(["scene", "as given: error", "0.5 h", "0.2 h", "0.05 h", "0.01 h"], rows)
+
+
+def steps_of(trial):
+    return f"{trial['substeps']}×{trial['iterations']}" + ("p" if trial["acceleration"] == "none" else "")
+
+
+def geometry(read):
+    rows = []
+    for scene in CUT_SCENES:
+        runs = {remove: [run for run in without_tears(read, remove) if run["scene"] == scene]
+                for remove in ("both", "one", "nearer")}
+        if not runs["nearer"]:
+            continue
+        rows.append([scene, *(span([ratio(run) for run in runs[remove]]) for remove in ("both", "one", "nearer")),
+                     span([run["hausdorff"] for run in runs["nearer"]], 1),
+                     span([run["skin_rms"] for run in runs["nearer"]])])
+    return table(["scene", "both: × least", "one", "nearer", "Hausdorff", "skin RMS"], rows)
+
+
+def baselines(read):
+    rows = []
+    for name in ("this method", "one end of each edge", "nearer end of each edge", "strain detection", "no expansion",
+                 "particles deleted, no split", "clusters deleted, no split"):
+        cells = [name + (" (both ends)" if name == "this method" else "")]
+        for particles in (1000, 10000, 100000):
+            runs = [row for row in read("h200_baselines")["rows"] if row["name"] == name and row["particles"] == particles]
+            cells.append(f"{statistics.median(ratio(run) for run in runs):.2f}")
+            if particles == 10000:
+                cells += [f"{statistics.median(run['hausdorff'] for run in runs):.1f}",
+                          span([run["components"] for run in runs], 0), span([run["couplings"] for run in runs], 0)]
+        rows.append([*cells[:2], *cells[2:3], cells[6], *cells[3:6]])
+    return table(["method", "1,000", "10,000", "100,000", "Hausdorff", "pieces", "couplings"], rows)
+
+
+SEEN = (("position", "step", "h"), ("velocity", "step", "h/dt"), ("rotation", "step", "rad"), ("impulse", "step", "M h/dt"),
+        ("gravity", "step", "of itself"), ("stiffness", "step", "of itself"), ("friction", "step", "of itself"),
+        ("impulse between pieces", "step", "of a weight"), ("mass", "split", "of itself"), ("rest center", "split", "h"),
+        ("skin vertex", "skin", "h"))
+
+
+def sensitivity(read):
+    found = {(row["scene"], row["disturbance"], row["stage"]): row for row in read("h200_sensitivity")["rows"]}
+    rows = []
+    for what, stage, unit in SEEN:
+        of = [found.get((scene, what, stage)) for scene in ("small_block", "kidney_discontinuous")]
+        if what == "friction":
+            of = [found["small_block, sliding", what, stage], None]
+        known = [row for row in of if row]
+        met = known[0]["within_goal"] if known[0]["within_goal"] is not None else None
+        if met is None:
+            goal = "none"
+        else:
+            goal = "met" if all(row["within_goal"] for row in known) else "missed"
+        rows.append([f"{what}, {unit}", stage, *(figure(row["least"]) if row else "–" for row in of), goal])
+    return table(["disturbance", "after", "small_block", "kidney_discontinuous", "goal"], rows)
+
+
+# --- libraries.md, mutation_testing.md -------------------------------------------------------------------------------
+
+def cuda_plugins(read):
+    rows = []
+    for name, judged in read("h200_guests")["judged"].items():
+        (operation,) = judged["operations"]
+        worst = max(operation["properties"], key=lambda of: of["failed"])
+        checked = max(of["checked"] for of in operation["properties"])
+        rows.append([f"`{name}`", f"{checked:,}", "holds" if judged["holds"] else
+                     f"{worst['property']}: {worst['failed']} of {operation['cases']:,} {operation['of']} fail"])
+    return table(["plugin", "answers", "verdict"], rows)
+
+
+def finder(row):
+    if not row["found"]:
+        return "not found"
+    if row["by"].startswith("fuzz"):
+        return "`fuzz`"
+    return "random property or schedule" if re.search(r"\b(case|schedule)s?\b", row["took"]) else "unit test"
+
+
+def mutants_by_finder(read):
+    document = read("mutation_testing")
+    finders = ("`fuzz`", "random property or schedule", "unit test", "not found")
+    rows = []
+    for stage in (*document["stages"], "all"):
+        of = [finder(row) for row in document["rows"] if stage in (row["stage"], "all")]
+        rows.append([stage, *(of.count(which) for which in finders), len(of)])
+    return table(["stage", *finders, "mutants"], rows)
+
+
+def mutants_alone(read):
+    alone = read("mutation_testing")["alone"]
+    rows = [[stage, *(f"{found} of {asked}" for found, asked in counts)] for stage, counts in alone["stages"].items()]
+    return table(["stage", *alone["columns"], "any"], rows)
+
+
+TABLES = {of.__name__: of for of in (status, table_1, fig_10, sizes, errors, solver, rotations, retardation, front, geometry,
+                                     baselines, sensitivity, cuda_plugins, mutants_by_finder, mutants_alone)}
+# Documents that only pictures are made of: docs/images/make.
+OF_PICTURES = {"h200_front_kidney_arc", "h200_front_small_block", "h200_front_cuboid_press", "h200_front_liver_cut"}
+
+
+# --- The command -----------------------------------------------------------------------------------------------------
+
+def made(text, read):
+    """The text with each table as the documents have it, and the names of these tables."""
+    names = []
+
+    def again(marked):
+        name = marked.group(1)
+        if name not in TABLES:
+            raise SystemExit(f"results: there is no table '{name}'; there are {', '.join(TABLES)}")
+        names.append(name)
+        return f"<!-- results: {name} -->\n{TABLES[name](read)}\n<!-- end -->"
+
+    return MARKED.sub(again, text), names
+
+
+def run(root, check):
+    read = Documents(root)
+    problems, names, pages = [], [], ""
+    for page in sorted((root / "docs/results").glob("*.md")):
+        text = page.read_text(encoding="utf-8")
+        new, found = made(text, read)
+        names += found
+        pages += text
+        if new == text:
+            continue
+        if check:
+            problems.append(f"{page.relative_to(root)}: tables differ from results/: make them by ci/results.sh")
+        else:
+            page.write_text(new, encoding="utf-8")
+            print(f"{page.relative_to(root)} written")
+    problems += [f"no page has the table '{name}'" for name in TABLES if names.count(name) != 1]
+    stored = {path.stem: path.stat().st_size for path in read.folder.glob("*.json")}
+    cited = set(re.findall(r"\b((?:cpu|h200)_\w+)\.json", pages))
+    problems += [f"there is no results/{name}.json" for name in sorted(cited - stored.keys())]
+    problems += [f"nothing cites results/{name}.json" for name in sorted(stored.keys() - cited - read.read.keys() - OF_PICTURES)]
+    if sum(stored.values()) > MOST_BYTES:
+        problems.append(f"results/ has {sum(stored.values()):,} bytes, more than {MOST_BYTES:,}")
+    for problem in problems:
+        print(problem)
+    print(f"{len(names)} tables, {len(stored)} documents, {sum(stored.values()) / 1e6:.2f} MB: "
+          + (f"{len(problems)} problems" if problems else "pages and documents agree"))
+    return 1 if problems else 0
+
+
+def extract_fronts(files, root):
+    """What tables need of `tune --full`: the scene as given, the front, how well the reference solution is known."""
+    kept = ("substeps", "iterations", "acceleration", "rotation", "differences", "rms_h", "max_h", "removed_otherwise",
+            "seconds_per_frame")
+    fronts = []
+    for file in files:
+        document = json.loads(pathlib.Path(file).read_text(encoding="utf-8"))
+        short = lambda k: {key: document["trials"][k][key] for key in kept}  # noqa: E731
+        fronts.append({"scene": scene_of(document), "again": document["again"], "commit": document["commit"],
+                       "retardation": "retardation" in document["again"], "known_h": document["reference"]["known_h"],
+                       "trials": len(document["trials"]), "as_given": short(0),
+                       "front": [{"tolerance_h": point["tolerance_h"], **short(point["trial"])}
+                                 for point in document["front"] if point.get("trial") is not None]})
+        device = document["device"]
+    lines = ",\n".join("  " + json.dumps(one) for one in fronts)
+    (root / "results/h200_fronts.json").write_text(
+        f'{{\n "command": "cutproof tune SCENE --full --backend gpu", "device": {json.dumps(device)},\n'
+        f' "left_out": "trials off the front, distances by frame",\n "fronts": [\n{lines}\n ]\n}}\n', encoding="utf-8")
+    print(f"results/h200_fronts.json: {len(fronts)} fronts")
+    return 0
+
+
+def self_test():
+    wrong = []
+    with tempfile.TemporaryDirectory() as folder:
+        root = pathlib.Path(folder)
+        shutil.copytree(ROOT / "docs/results", root / "docs/results")
+        shutil.copytree(ROOT / "results", root / "results")
+        page = root / "docs/results/mutation_testing.md"
+        sound = page.read_text(encoding="utf-8")
+        stray = root / "results/h200_stray.json"
+        changes = {
+            "nothing": (0, lambda: None),
+            "a changed figure": (1, lambda: page.write_text(re.sub(r"\d+ \|\n<!-- end", "1 |\n<!-- end", sound, count=1))),
+            "a table less": (1, lambda: page.write_text(MARKED.sub("", sound, count=1))),
+            "a document that nothing cites": (1, lambda: stray.write_text("{}")),
+            "a document that is missing": (1, lambda: page.write_text(sound + "\n`cpu_gone.json`\n")),
+        }
+        for what, (status_, change) in changes.items():
+            page.write_text(sound, encoding="utf-8")
+            stray.unlink(missing_ok=True)
+            change()
+            if run(root, True) != status_:
+                wrong.append(what)
+    print(f"self-test: {', '.join(wrong) + ' not told' if wrong else 'all told'}")
+    return 1 if wrong else 0
+
+
+def main():
+    parser = argparse.ArgumentParser(description="Makes the tables of docs/results/*.md from results/*.json.")
+    parser.add_argument("--check", action="store_true", help="whether pages and documents agree; writes nothing")
+    parser.add_argument("--fronts", nargs="+", metavar="TUNE", help="make results/h200_fronts.json of these documents")
+    parser.add_argument("--self-test", action="store_true", help="whether --check finds what is wrong")
+    options = parser.parse_args()
+    if options.fronts:
+        return extract_fronts(options.fronts, ROOT)
+    return self_test() if options.self_test else run(ROOT, options.check)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
