@@ -21,14 +21,13 @@ import subprocess
 import sys
 import tempfile
 
-FOLDERS = ("model", "fixtures", "reference_cpu", "gpu", "oracles", "harness", "report", "property_tests", "tuning", "benchmarks",
-         "cli", "tests", "ci", "docs", "cmake")
+FOLDERS = ("model", "fixtures", "reference_cpu", "gpu", "oracles", "harness", "report", "property_tests", "tuning",
+           "benchmarks", "cli", "tests", "ci", "docs", "cmake", "results")
 CODE = (".h", ".cpp", ".cu", ".cuh", ".py", ".sh", ".cmake", ".slurm", ".yml")
 FILES = r"(?:h|cuh|cpp|cu|py|sh|md|json|cmake|svg|png|patch|slurm|yml)"
 # Counterexamples, inputs and results are records of what was said when they were made; the self-test below is full of
 # what must not be found.
-RECORDS = ("fixtures/regressions/*.json", "fixtures/regressions/inputs/*", "results/*.json", "docs/results/*.json",
-           "ci/check_docs.py")
+RECORDS = ("fixtures/regressions/*.json", "fixtures/regressions/inputs/*", "results/*.json", "ci/check_docs.py")
 # A word that the glossary has replaced, and what it says instead.
 OLD_WORDS = {r"planted[ _]faults?": "mutant, mutation testing", r"two_runs": "relations",
              r"time-?tables?": "schedule", r"shadow runs?": "free-running", r"so manieth": "every n-th"}

@@ -1,10 +1,9 @@
 #!/usr/bin/env python3
 """Makes the tables of docs/results/*.md from the documents in results/.
 
-Usage: results.py                        writes every table between `<!-- results: NAME -->` and `<!-- end -->`
-       results.py --check                whether pages and documents agree; writes nothing
-       results.py --fronts TUNE.json...  makes results/h200_fronts.json, an extract of documents of `cutproof tune --full`
-       results.py --self-test            whether --check finds a changed figure, a missing table and a document not cited
+Usage: results.py                writes every table between `<!-- results: NAME -->` and `<!-- end -->`
+       results.py --check        whether pages and documents agree; writes nothing
+       results.py --self-test    whether --check finds a changed figure, a missing table and a document not cited
 
 --check further asks that every document is cited by a page or read by a table or a picture, that every cited document
 exists, and that all of them together have 2 MB at most. Exit status: 0 yes, 1 no, 2 bad usage or a missing document.
@@ -44,19 +43,15 @@ class Documents:
 # --- Figures ---------------------------------------------------------------------------------------------------------
 
 def figure(value, digits=2):
-    """A number to so many digits; small and great ones with an exponent."""
-    if value is None or value in ("inf", float("inf")):
+    """A number to so many digits: with an exponent if it is small, with commas if it is great."""
+    if value is None or value == "inf":
         return "–"
-    if value == 0:
-        return "0"
-    text = f"{value:.{digits}g}"
-    if 1e-4 <= abs(value) < 10 ** digits:
-        places = max(0, digits - 1 - int(text.split("e")[1]) if "e" in text else digits)
-        return text if "e" not in text else f"{value:.{places}f}"
+    if value != 0 and abs(value) < 1e-3:
+        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+        return f"{mantissa}e{int(exponent)}"
     if abs(value) >= 10 ** digits:
-        return f"{float(text):,.0f}"
-    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
-    return f"{mantissa}e{int(exponent)}"
+        return f"{float(f'{value:.{digits}g}'):,.0f}"
+    return f"{value:#.{digits}g}".rstrip(".")
 
 
 def milliseconds(seconds):
@@ -68,7 +63,7 @@ def milliseconds(seconds):
 
 def span(values, digits=2):
     low, high = f"{min(values):.{digits}f}", f"{max(values):.{digits}f}"
-    return low if low == high else f"{low} to {high}"
+    return low if low == high else f"{low}–{high}"
 
 
 def percent(part, whole):
@@ -79,14 +74,6 @@ def table(head, rows):
     for row in rows:
         assert len(row) == len(head), (head, row)
     return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in (head, ["---"] * len(head), *rows))
-
-
-def scene_of(document):
-    return document["scene"].rsplit("/", 1)[-1].removesuffix(".json")
-
-
-def step_error(row):
-    return row["error"]["max_h"]
 
 
 # --- README.md -------------------------------------------------------------------------------------------------------
@@ -125,11 +112,7 @@ def status(read):
     campaigns = [row for row in read("h200_campaigns")["rows"] if row["backend"] == "gpu"]
     rows.append(["cases a second", "`cutproof bench campaigns --backend gpu`", "H200",
                  "; ".join(f"{row['campaign']} {figure(row['cases_per_second'])}" for row in campaigns)])
-    seen = read("h200_sensitivity")
-    goals = [row for row in seen["rows"] if row["within_goal"] is not None and row["stage"] not in ("detect",)
-             and row["property"] != "untouched"]
     rows.append(["least error rejected", "`cutproof bench sensitivity --backend gpu`", "H200",
-                 f"{sum(row['within_goal'] for row in goals)} of {len(goals)} goals met; "
                  "[sensitivity](accuracy.md#sensitivity)"])
     mutants = read("mutation_testing")["rows"]
     rows.append(["mutants", "`ci/mutation_testing.sh`", "CPU",
@@ -138,23 +121,27 @@ def status(read):
 
 
 def table_1(read):
-    stages = {row["what"]: {} for row in read("h200_table_1")["rows"]}
-    for row in read("h200_table_1")["rows"]:
-        if row.get("split", "blocks") == "blocks":
-            stages[row["what"]][row["scene"], row["cooking"]] = row
-    bodies = {(one["scene"], one["cooking"]): one["body"] for one in read("h200_table_1")["scenes"]}
-    scenes = ("cuboid", "liver", "kidney")
-    both = lambda scene, what: " / ".join(what(scene, cooking) for cooking in ("boxes", "sampled"))  # noqa: E731
-    rows = [["particles"] + [cell for scene in scenes for cell in (
-        f"{bodies[scene, 'boxes']['particles']:,}", "101,096" if scene == "kidney" else "–")]]
-    rows.append(["clusters"] + [cell for scene in scenes for cell in (
-        both(scene, lambda s, c: f"{bodies[s, c]['clusters']}"), "795" if scene == "kidney" else "–")])
+    """Boxes, blocks; the kidney by the document of its sizes, which is newer than that of the other two."""
+    times, particles, clusters = {}, {}, {}
+    document = read("h200_table_1")
+    for row in document["rows"]:
+        if row["cooking"] == "boxes" and row["split"] == "blocks":
+            times[row["scene"], row["what"]] = row["seconds"], row["paper_seconds"]
+    for one in document["scenes"]:
+        if one["cooking"] == "boxes":
+            particles[one["scene"]], clusters[one["scene"]] = one["body"]["particles"], one["body"]["clusters"]
+    kidney = max(read("h200_sampling")["rows"], key=lambda row: row["particles"])
+    particles["kidney"], clusters["kidney"] = kidney["particles"], kidney["clusters"]
     for what in ("step", "detect", "split", "merge", "expand", "skin", "frame"):
-        cells = [what]
-        for scene in scenes:
-            paper = stages[what][scene, "boxes"]["paper_seconds"]
-            cells += [both(scene, lambda s, c: milliseconds(stages[what][s, c]["seconds"])), f"{paper * 1e3:.2f}"]
-        rows.append(cells)
+        times["kidney", what] = kidney["seconds"][what], times["kidney", what][1]
+    scenes = ("cuboid", "liver", "kidney")
+    rows = [["particles", *sum(([f"{particles[one]:,}", f"{kidney['paper']['particles']:,}" if one == "kidney" else "–"]
+                                for one in scenes), [])],
+            ["clusters", *sum(([clusters[one], kidney["paper"]["clusters"] if one == "kidney" else "–"]
+                               for one in scenes), [])]]
+    for what in ("step", "detect", "split", "merge", "expand", "skin", "frame"):
+        rows.append([what, *sum(([milliseconds(times[one, what][0]), f"{times[one, what][1] * 1e3:.2f}"]
+                                 for one in scenes), [])])
     return table(["", "cuboid", "paper", "liver", "paper", "kidney", "paper"], rows)
 
 
@@ -171,23 +158,21 @@ def fig_10(read):
 def sizes(read):
     """Frames of a cut, plain and accelerated, and those of the paper's kidneys beside its own."""
     rows = []
-    for document in (read("h200_stages_rooms"), read("h200_stages_10M_one_condition")):
-        found = {}
+    for name in ("h200_stages_rooms", "h200_stages_10M_one_condition", "h200_stages_sampled_traced"):
+        document, found = read(name), {}
         for row in document["rows"]:
-            if row["what"] in ("frame", "frame, cutting", "step"):
-                found.setdefault(row["particles"], {})[row["acceleration"], row["what"]] = row
-        memory = {}
-        for one in document["scenes"]:
-            memory.setdefault(one["body"]["particles"], one["bytes"])
+            found.setdefault(row["particles"], {})[row["acceleration"], row["what"]] = row
         for particles, of in found.items():
+            body = next(one for one in document["scenes"] if one["body"]["particles"] == particles)
             fast = of.get(("chebyshev", "frame, cutting"))
-            rows.append(["straight cut", f"{particles:,}", milliseconds(of["none", "frame, cutting"]["seconds"]),
-                         milliseconds(fast["seconds"]) if fast else "–", "–", figure(step_error(of["none", "step"])),
-                         f"{memory[particles] / 1e6:,.0f}"])
+            rows.append(["straight cut" + (", sampled" if body["cooking"] == "sampled" else ""), f"{particles:,}",
+                         milliseconds(of["none", "frame, cutting"]["seconds"]),
+                         milliseconds(fast["seconds"]) if fast else "–", "–",
+                         figure(of["none", "step"]["error"]["max_h"]), f"{body['bytes'] / 1e6:,.0f}"])
     for row in sorted(read("h200_sampling")["rows"], key=lambda row: row["particles"]):
-        rows.append(["kidney of Table 2", f"{row['particles']:,}", "–", milliseconds(row["seconds"]["frame, cutting"]),
+        rows.append(["paper's kidney", f"{row['particles']:,}", "–", milliseconds(row["seconds"]["frame"]),
                      f"{row['paper']['frame_seconds'] * 1e3:.4g}", figure(row["error"]["step"]["max_h"]), "–"])
-    return table(["body", "particles", "plain, ms", "Chebyshev, ms", "paper, ms", "error of a step, h", "MB"], rows)
+    return table(["body", "particles", "plain", "Chebyshev", "paper", "error, h", "MB"], rows)
 
 
 # --- accuracy.md -----------------------------------------------------------------------------------------------------
@@ -205,27 +190,26 @@ def errors(read):
     nearer = without_tears(read, "nearer")
     limits = {scene: levels_of(read(f"cpu_tune_limit_{scene}")) for scene in CUT_SCENES}
     last = [levels[-1]["apart_h"] for levels in limits.values()]
-    known = [read(f"cpu_tune_retarded_{scene}")["reference"]["known_h"] for scene in CUT_SCENES]
-    known = [value for value in known if value != "inf"]
+    known = [known_to(read(f"cpu_tune_retarded_{scene}")) for scene in CUT_SCENES]
+    known = [value for value in known if value is not None]
     total = random_steps["particles"] + random_steps["undecidable"]
     return table(["error", "size", "depends on"], [
         ["implementation: single precision beside the double-precision reference, one frame",
          f"scenes: at most {figure(max(one['greatest']['position']['max'] for one in lockstep))} h; random cases: at most "
-         f"{figure(random_steps['greatest_h'])} h in {random_steps['steps']:,} steps, without the "
-         f"{percent(random_steps['undecidable'], total)} of positions that rounding can carry farther",
+         f"{figure(random_steps['greatest_h'])} h in {random_steps['steps']:,} steps, without "
+         f"{percent(random_steps['undecidable'], total)} of positions, which rounding can carry farther",
          "stiffness, contacts"],
-        ["solver: a scene as given beside the same substeps solved",
-         f"one substep: {figure(min(one['rms_h'] for one in solved))} to {figure(max(one['rms_h'] for one in solved))} h RMS, "
-         f"{figure(max(one['max_h'] for one in solved))} h at worst; whole scene: {figure(min(given))} to "
-         f"{figure(max(given))} h RMS", "stiffness × dt², iterations"],
-        ["geometry: the skin of a cut beside the blade's path through the tissue, nearer end removed",
-         f"{span([run['skin_rms'] for run in nearer])} h RMS; {span([ratio(run) for run in nearer])} times the least tissue "
-         "that any removal can lose", "grid"],
-        ["time step: the limit of many substeps",
+        ["solver: as given beside the same substeps solved",
+         f"a substep: {figure(max(one['rms_h'] for one in solved))} h RMS at most, "
+         f"{figure(max(one['max_h'] for one in solved))} h at worst; a scene: {figure(min(given))}–{figure(max(given))} h RMS",
+         "k dt², iterations"],
+        ["geometry: skin beside the blade's path, nearer end removed",
+         f"{span([run['skin_rms'] for run in nearer])} h RMS; {span([ratio(run) for run in nearer])} times the least loss of "
+         "tissue", "grid"],
+        ["time step",
          f"without retardation {span(last)} h between the last two levels; with it the limit is known to "
-         f"{figure(min(known))} to {figure(max(known))} h in {len(known)} of {len(CUT_SCENES)} cut scenes",
-         "dt, damping"],
-        ["model: another cluster size is another material", "not an error of the program", "cluster size"]])
+         f"{figure(min(known))}–{figure(max(known))} h in {len(known)} of {len(CUT_SCENES)} cut scenes", "dt, damping"],
+        ["model: another cluster size is another material", "no error of the program", "cluster size"]])
 
 
 def ratio(run):
@@ -234,25 +218,36 @@ def ratio(run):
 
 def levels_of(document):
     levels = (document.get("reference") or document["answer"])["levels"]
-    return [level for level in levels if level["apart_h"] is not None]
+    return [level for level in levels if isinstance(level["apart_h"], float)]
+
+
+def known_to(document):
+    """As tuning/reference_solution.cpp says it, whose rule is younger than some documents."""
+    levels = document["reference"]["levels"]
+    apart = [level["apart_h"] for level in levels[1:]]
+    same = all(level["alive_in_one"] == level["removed_in_another_frame"] == 0 for level in levels[-2:])
+    if not same or not isinstance(apart[-1], float):
+        return None
+    falls_by = min(before / after for before, after in zip(apart, apart[1:]))
+    return max(apart[-1], apart[-1] / (falls_by - 1)) if falls_by > 1 else None
 
 
 def solver(read):
     rows = []
     for one in read("h200_solver")["scenes"]:
-        if one["substeps"] != 1:
+        if one["substeps"] != 1 or one["stiffness"] < 1e5:  # below, nothing is gained or lost
             continue
         reached = {of["acceleration"]: of for of in one["to_tolerance"]}
         rows.append([f"{one['scene'].split('_')[0]}, {one['particles']:,}", f"{one['stiffness']:.0e}".replace("e+0", "e"),
-                     *(f"{reached[which]['iterations']} in {reached[which]['seconds'] * 1e3:.3f} ms"
+                     *(f"{reached[which]['iterations']}, {reached[which]['seconds'] * 1e3:.3f}"
                        for which in ("none", "chebyshev"))])
-    return table(["body, particles", "k, 1/s²", "plain iterations", "Chebyshev"], rows)
+    return table(["body, particles", "k, 1/s²", "plain: iterations, ms", "Chebyshev"], rows)
 
 
 def rotations(read):
     rows = []
     for one in read("h200_rotations")["methods"]:
-        if one["precision"] == "single":
+        if one["precision"] == "single" and one["method"] != "mueller_cold":
             rows.append([f"`{one['method']}`" + (", default" if one["default"] or one["method"] == "newton" else ""),
                          figure(one["worst_gap"]), one["wrong"],
                          *(figure(one[f"{which}_seconds_per_million"]["median"] * 1e3) for which in ("near", "cold"))])
@@ -262,29 +257,33 @@ def rotations(read):
 def retardation(read):
     rows = []
     for scene in (*CUT_SCENES, "uniform_stretch"):
-        damped = read(f"cpu_tune_retarded_{scene}")["reference"]
-        apart = {level["substeps"]: level["apart_h"] for level in damped["levels"]}
+        damped = read(f"cpu_tune_retarded_{scene}")
+        apart = {level["substeps"]: level["apart_h"] for level in levels_of(damped)}
         plain = {}
         if scene in CUT_SCENES:
             plain = {level["substeps"]: level["apart_h"] for level in levels_of(read(f"cpu_tune_limit_{scene}"))}
-        shown = lambda value: figure(value) if isinstance(value, float) else "–"  # noqa: E731
-        rows.append([scene, *(shown(plain.get(level)) for level in (64, 128, 256)),
-                     *(shown(apart.get(level)) for level in (64, 128, 256, 512)),
-                     "not" if damped["known_h"] == "inf" else figure(damped["known_h"])])
-    return table(["scene", "64", "128", "256", "retarded: 64", "128", "256", "512", "known to"], rows)
+        known = known_to(damped)
+        rows.append([scene, *(figure(plain.get(level)) for level in (64, 128)),
+                     *(figure(apart.get(level)) for level in (64, 128, 256, 512)),
+                     "not known" if known is None else figure(known)])
+    return table(["scene", "64", "128", "retarded: 64", "128", "256", "512", "limit known to"], rows)
+
+
+FRONT_SCENES = ("small_block", "kidney_arc", "three_cuts", "cuboid_press", "liver_cut", "irregular_sampled", "kidney_101096")
 
 
 def front(read):
     rows = []
     for one in read("h200_fronts")["fronts"]:
-        given = one["as_given"]
-        cells = []
-        for tolerance in (0.5, 0.2, 0.05, 0.01):
+        if one["scene"] not in FRONT_SCENES:
+            continue
+        given, cells = one["as_given"], []
+        for tolerance in (0.5, 0.05, 0.01):
             within = next((point for point in one["front"] if point["tolerance_h"] == tolerance), None)
             cells.append(f"{milliseconds(within['seconds_per_frame'])} ({steps_of(within)})" if within else "–")
         rows.append([one["scene"] + (", retarded" if one["retardation"] else ""),
                      f"{milliseconds(given['seconds_per_frame'])} ({steps_of(given)}): {figure(given['rms_h'])}", *cells])
-    return table(["scene", "as given: error", "0.5 h", "0.2 h", "0.05 h", "0.01 h"], rows)
+    return table(["scene", "as given: error", "0.5 h", "0.05 h", "0.01 h"], rows)
 
 
 def steps_of(trial):
@@ -304,11 +303,23 @@ def geometry(read):
     return table(["scene", "both: × least", "one", "nearer", "Hausdorff", "skin RMS"], rows)
 
 
+def cut_faces(read):
+    """Skin beside the blade's path; what of both ends stands halfway, and each rule fitted."""
+    found = {(row["scene"], row["remove"], row["fit_cuts"]): row for row in read("cpu_cut_faces_host")["rows"]}
+    columns = (("both", False), ("both", True), ("one", True), ("nearer", True))
+    scenes = [scene for scene in CUT_SCENES if (scene, "nearer", True) in found]
+    rows = [[scene, *(figure(found[scene, *of]["skin_rms"]) for of in columns),
+             figure(found[scene, "nearer", True]["hausdorff"])] for scene in scenes]
+    mean = lambda of: figure(statistics.mean(found[scene, *of]["skin_rms"] for scene in scenes))  # noqa: E731
+    rows.append(["mean", *(mean(of) for of in columns), "–"])
+    return table(["scene", "both, halfway", "both, fitted", "one, fitted", "nearer, fitted (default)", "its Hausdorff"], rows)
+
+
 def baselines(read):
     rows = []
-    for name in ("this method", "one end of each edge", "nearer end of each edge", "strain detection", "no expansion",
-                 "particles deleted, no split", "clusters deleted, no split"):
-        cells = [name + (" (both ends)" if name == "this method" else "")]
+    for name in ("this method", "nearer end of each edge", "strain detection", "no expansion", "particles deleted, no split",
+                 "clusters deleted, no split"):
+        cells = ["both ends of each edge" if name == "this method" else name]
         for particles in (1000, 10000, 100000):
             runs = [row for row in read("h200_baselines")["rows"] if row["name"] == name and row["particles"] == particles]
             cells.append(f"{statistics.median(ratio(run) for run in runs):.2f}")
@@ -319,9 +330,9 @@ def baselines(read):
     return table(["method", "1,000", "10,000", "100,000", "Hausdorff", "pieces", "couplings"], rows)
 
 
-SEEN = (("position", "step", "h"), ("velocity", "step", "h/dt"), ("rotation", "step", "rad"), ("impulse", "step", "M h/dt"),
-        ("gravity", "step", "of itself"), ("stiffness", "step", "of itself"), ("friction", "step", "of itself"),
-        ("impulse between pieces", "step", "of a weight"), ("mass", "split", "of itself"), ("rest center", "split", "h"),
+SEEN = (("position", "step", "h"), ("velocity", "step", "h/dt"), ("rotation", "step", "rad"), ("gravity", "step", "relative"),
+        ("stiffness", "step", "relative"), ("friction", "step", "relative"), ("impulse between pieces", "step", "weights"),
+        ("mass", "split", "relative"), ("rest center", "split", "h"),
         ("skin vertex", "skin", "h"))
 
 
@@ -332,14 +343,52 @@ def sensitivity(read):
         of = [found.get((scene, what, stage)) for scene in ("small_block", "kidney_discontinuous")]
         if what == "friction":
             of = [found["small_block, sliding", what, stage], None]
-        known = [row for row in of if row]
-        met = known[0]["within_goal"] if known[0]["within_goal"] is not None else None
-        if met is None:
-            goal = "none"
-        else:
-            goal = "met" if all(row["within_goal"] for row in known) else "missed"
+        goal = "met" if all(row["within_goal"] for row in of if row) else "missed"
         rows.append([f"{what}, {unit}", stage, *(figure(row["least"]) if row else "–" for row in of), goal])
     return table(["disturbance", "after", "small_block", "kidney_discontinuous", "goal"], rows)
+
+
+def isolation(read):
+    rows = []
+    for row in read("cpu_isolation")["rows"]:
+        if row["ratio"] in ("1.10", "1.35", "1.75"):  # between others
+            continue
+        cells = [percent(row[when], row["runs"]) if row[when] else "0"
+                 for when in ("before", "after_split", "published", "edge_cover")]
+        rows.append([row["ratio"], *cells])
+    return table(["radius / spacing", "before", "after split", "published expansion", "`edge_cover`"], rows)
+
+
+def claims(read):
+    """What the paper claims, what its own tables say, and what was measured."""
+    frames = {row["scene"]: row["paper_seconds"] for row in read("h200_table_1")["rows"] if row["what"] == "frame"}
+    sums = {scene: 0 for scene in ("cuboid", "liver", "kidney")}
+    for row in read("h200_table_1")["rows"]:
+        if row["scene"] in sums and row["cooking"] == "boxes" and row["split"] == "blocks" and \
+                row["what"] in ("step", "detect", "split", "merge", "expand", "skin"):
+            sums[row["scene"]] += row["paper_seconds"]
+    saved = ", ".join(f"{100 * (1 - frames[scene] / total):.1f}" for scene, total in sums.items())
+    kidneys = {row["paper"]["particles"]: row for row in read("h200_sampling")["rows"]}
+    few, many = kidneys[48385], kidneys[101096]
+    growth = [row["growth"] for row in read("cpu_clusters_host")["rows"] if row["tau"] is not None]
+    loss = {name: statistics.median(ratio(row) for row in read("h200_baselines")["rows"]
+                                    if row["name"] == name and row["particles"] == 10000)
+            for name in ("this method", "clusters deleted, no split", "particles deleted, no split")}
+    more = lambda seconds: f"{100 * (seconds(many) / seconds(few) - 1):.0f} % more"  # noqa: E731
+    return table(["claim", "the paper's figures", "measured"], [
+        ["concurrent stages save 5 to 15 %", f"Table 1: frames take {saved} % less than the sum of their stages", "–"],
+        ["30 frames a second in complex scenes",
+         f"Table 1: {1 / frames['liver']:.1f} for the liver, {1 / frames['kidney']:.1f} for the kidney", "–"],
+        ["twice the particles cost half as much again",
+         f"Table 2, rows 2 and 4: {101096 / 48385:.2f} times the particles cost "
+         f"{more(lambda row: row['paper']['frame_seconds'])}",
+         f"{more(lambda row: row['seconds']['frame']['median'])} ([sizes](README.md#sizes))"],
+        ["+1 % clusters after a cut", "begins at frame 35 (text) or 30 (caption); τ not given",
+         f"{100 * min(growth):+.1f} to {100 * max(growth):+.1f} % ([Fig. 10](README.md#fig-10-clusters-during-a-cut))"],
+        ["expansion leaves no isolated cluster", "one picture", "some, below"],
+        ["Berndt et al. lose much volume", "one picture",
+         f"deleting clusters {loss['clusters deleted, no split']:.1f}, deleting particles "
+         f"{loss['particles deleted, no split']:.1f}, this method {loss['this method']:.1f} times the least"]])
 
 
 # --- libraries.md, mutation_testing.md -------------------------------------------------------------------------------
@@ -375,12 +424,13 @@ def mutants_by_finder(read):
 
 def mutants_alone(read):
     alone = read("mutation_testing")["alone"]
-    rows = [[stage, *(f"{found} of {asked}" for found, asked in counts)] for stage, counts in alone["stages"].items()]
+    rows = [[stage, *(f"{found}/{asked}" for found, asked in counts)] for stage, counts in alone["stages"].items()]
     return table(["stage", *alone["columns"], "any"], rows)
 
 
-TABLES = {of.__name__: of for of in (status, table_1, fig_10, sizes, errors, solver, rotations, retardation, front, geometry,
-                                     baselines, sensitivity, cuda_plugins, mutants_by_finder, mutants_alone)}
+TABLES = {of.__name__: of for of in (status, table_1, fig_10, sizes, errors, solver, rotations, retardation, front, cut_faces,
+                                     geometry, baselines, sensitivity, claims, isolation, cuda_plugins, mutants_by_finder,
+                                     mutants_alone)}
 # Documents that only pictures are made of: docs/images/make.
 OF_PICTURES = {"h200_front_kidney_arc", "h200_front_small_block", "h200_front_cuboid_press", "h200_front_liver_cut"}
 
@@ -430,28 +480,6 @@ def run(root, check):
     return 1 if problems else 0
 
 
-def extract_fronts(files, root):
-    """What tables need of `tune --full`: the scene as given, the front, how well the reference solution is known."""
-    kept = ("substeps", "iterations", "acceleration", "rotation", "differences", "rms_h", "max_h", "removed_otherwise",
-            "seconds_per_frame")
-    fronts = []
-    for file in files:
-        document = json.loads(pathlib.Path(file).read_text(encoding="utf-8"))
-        short = lambda k: {key: document["trials"][k][key] for key in kept}  # noqa: E731
-        fronts.append({"scene": scene_of(document), "again": document["again"], "commit": document["commit"],
-                       "retardation": "retardation" in document["again"], "known_h": document["reference"]["known_h"],
-                       "trials": len(document["trials"]), "as_given": short(0),
-                       "front": [{"tolerance_h": point["tolerance_h"], **short(point["trial"])}
-                                 for point in document["front"] if point.get("trial") is not None]})
-        device = document["device"]
-    lines = ",\n".join("  " + json.dumps(one) for one in fronts)
-    (root / "results/h200_fronts.json").write_text(
-        f'{{\n "command": "cutproof tune SCENE --full --backend gpu", "device": {json.dumps(device)},\n'
-        f' "left_out": "trials off the front, distances by frame",\n "fronts": [\n{lines}\n ]\n}}\n', encoding="utf-8")
-    print(f"results/h200_fronts.json: {len(fronts)} fronts")
-    return 0
-
-
 def self_test():
     wrong = []
     with tempfile.TemporaryDirectory() as folder:
@@ -481,11 +509,8 @@ def self_test():
 def main():
     parser = argparse.ArgumentParser(description="Makes the tables of docs/results/*.md from results/*.json.")
     parser.add_argument("--check", action="store_true", help="whether pages and documents agree; writes nothing")
-    parser.add_argument("--fronts", nargs="+", metavar="TUNE", help="make results/h200_fronts.json of these documents")
     parser.add_argument("--self-test", action="store_true", help="whether --check finds what is wrong")
     options = parser.parse_args()
-    if options.fronts:
-        return extract_fronts(options.fronts, ROOT)
     return self_test() if options.self_test else run(ROOT, options.check)
 
 

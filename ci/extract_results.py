@@ -1,0 +1,83 @@
+#!/usr/bin/env python3
+"""Makes small documents in results/ of what tables need of many or large ones. Each says what it leaves out.
+
+Usage: extract_results.py fronts TUNE.json...      of `cutproof tune SCENE --full --backend gpu --json`
+       extract_results.py lockstep RUN.json...     of `cutproof run SCENE --backend host --against reference --mode lockstep`
+       extract_results.py cut_faces RUN.json...    of `cutproof run SCENE --backend host --errors geometry`, with
+                                                   `--set detect.remove=R --set skin.fit_cuts=F` and in files SCENE.R.F.json
+       extract_results.py isolation TEXT           of what `isolation_sweep --bodies 6000 --seed 1` prints
+Then ci/results.sh makes the tables.
+"""
+import json
+import pathlib
+import re
+import sys
+
+RESULTS = pathlib.Path(__file__).resolve().parent.parent / "results"
+OF_TRIALS = ("substeps", "iterations", "acceleration", "rotation", "differences", "rms_h", "max_h", "removed_otherwise",
+             "seconds_per_frame")
+
+
+def write(name, head, key, rows):
+    lines = [f" {json.dumps(field)}: {json.dumps(value)}," for field, value in head.items()]
+    lines += [f' "{key}": [', ",\n".join("  " + json.dumps(row) for row in rows), " ]"]
+    (RESULTS / f"{name}.json").write_text("\n".join(["{", *lines, "}"]) + "\n", encoding="utf-8")
+    print(f"results/{name}.json: {len(rows)} rows")
+
+
+def fronts(documents):
+    rows = []
+    for _, document in documents:
+        short = lambda k: {key: document["trials"][k][key] for key in OF_TRIALS}  # noqa: E731,B023
+        rows.append({"scene": document["scene"].rsplit("/", 1)[-1].removesuffix(".json"), "again": document["again"],
+                     "commit": document["commit"], "retardation": "retardation" in document["again"],
+                     "known_h": document["reference"]["known_h"], "trials": len(document["trials"]), "as_given": short(0),
+                     "front": [{"tolerance_h": point["tolerance_h"], **short(point["trial"])}
+                               for point in document["front"] if point.get("trial") is not None]})
+    write("h200_fronts", {"command": "cutproof tune SCENE --full --backend gpu", "device": documents[0][1]["device"],
+                          "left_out": "trials off the front, distances by frame"}, "fronts", rows)
+
+
+def lockstep(documents):
+    rows = []
+    for _, document in documents:
+        run = document["against"]["lockstep"]
+        rows.append({"scene": document["scene"], "particles": document["body"]["particles"],
+                     "holds": document["against"]["holds"], "frames": len(document["frames"]),
+                     "topology_differences": sum(run["frames"]["topology_differences"]),
+                     "positions_undecidable": sum(run["frames"]["positions_undecidable"]), "greatest": run["greatest"]})
+    write("cpu_lockstep_host", {"command": "cutproof run SCENE --backend host --against reference --mode lockstep",
+                                "left_out": "verdicts, what each frame did"}, "scenes", rows)
+
+
+def cut_faces(documents):
+    rows = []
+    for file, document in documents:
+        scene, remove, fit_cuts = file.stem.split(".")
+        kept = {key: document["errors"]["geometry"][key] for key in ("lost_per_area", "least_per_area", "hausdorff", "skin_rms")}
+        rows.append({"scene": scene, "particles": document["body"]["particles"], "remove": remove,
+                     "fit_cuts": fit_cuts == "true", **kept})
+    write("cpu_cut_faces_host", {"command": "cutproof run SCENE --backend host --errors geometry --set detect.remove=R "
+                                            "--set skin.fit_cuts=F", "left_out": "verdicts, what each frame did"}, "rows", rows)
+
+
+def isolation(text):
+    # ratio, runs, then a count and a percentage of each of four
+    line = re.compile(r"^ +([\d.]+|boxes) +(\d+)" + r" +(\d+) +[\d.]+ %" * 4, re.MULTILINE)
+    rows = [dict(zip(("ratio", "runs", "before", "after_split", "published", "edge_cover"),
+                     [found.group(1), *map(int, found.groups()[1:])])) for found in line.finditer(text)]
+    write("cpu_isolation", {"command": "isolation_sweep --bodies 6000 --seed 1"}, "rows", rows)
+
+
+def main(arguments):
+    makers = {"fronts": fronts, "lockstep": lockstep, "cut_faces": cut_faces}
+    if len(arguments) < 2 or arguments[0] not in {*makers, "isolation"}:
+        sys.exit(__doc__)
+    files = [pathlib.Path(file) for file in arguments[1:]]
+    if arguments[0] == "isolation":
+        return isolation(files[0].read_text(encoding="utf-8"))
+    return makers[arguments[0]]([(file, json.loads(file.read_text(encoding="utf-8"))) for file in files])
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
