@@ -8,14 +8,33 @@ import json
 import math
 
 from log_axes import HEIGHT, LEFT, WIDTH, LogAxes
-from tune_curve import ACCELERATED, MARK, PLAIN, front_of, points_of
 
+PLAIN, ACCELERATED, MARK = "#1b6ca8", "#c1572b", "#3c8d40"
 COLUMNS = 2
 TOLERANCES = (0.5, 0.2, 0.05, 0.01)
 # Exponents of ten, and ticks: the same in every panel of a picture.
 X = {"gpu": ((-1.0, 0.7), (0.1, 0.2, 0.5, 1, 2, 5)), "host": ((-0.2, 1.7), (1, 2, 5, 10, 20, 50))}
 Y = (-3.3, 1.0)
 LEGEND = 40
+
+
+def points_of(document):
+    """[(milliseconds, error, trial)] of what was carried through."""
+    return [
+        (1e3 * t["seconds_per_frame"]["median"], t["rms_h"], t)
+        for t in document["trials"]
+        if t["seconds_per_frame"] and not isinstance(t["rms_h"], str) and t["rms_h"] > 0
+    ]
+
+
+def front_of(points):
+    """Those than which none is both cheaper and more accurate."""
+    front, best = [], math.inf
+    for point in sorted(points, key=lambda p: (p[0], p[1])):
+        if point[1] < best:
+            front.append(point)
+            best = point[1]
+    return front
 
 
 def panel(document):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Every stored result (docs/results/*.json): `cutproof report` makes a page of it, or refuses another format version, and
+"""Every stored result (results/*.json): `cutproof report` makes a page of it, or refuses another format version, and
 whatever else is not as this program writes it, by file, field and remedy. Usage: stored_results_test.py CUTPROOF RESULTS WORK. Needs no browser."""
 import json
 import pathlib
@@ -12,11 +12,10 @@ program, results, work = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sy
 shutil.rmtree(work, ignore_errors=True)
 work.mkdir(parents=True)
 
-# Put together by hand of several results, so no command has written them: what they hold has no page as it stands.
-COLLECTIONS = {"cpu_scenes_converged", "h200_baselines_sizes", "h200_baselines_sizes_nearer", "h200_geometry_nearer",
-               "h200_geometry_nearer_sizes", "h200_geometry_sizes", "h200_guests", "h200_kit_summary", "h200_lockstep",
-               "h200_lockstep_groups", "h200_scenes_converged", "h200_solver_every_frame", "h200_stages_asked",
-               "h200_stages_before_asked"}
+# Extracts of several documents (ci/extract_results.py and others), so no command has written them: they have no page as they
+# stand.
+COLLECTIONS = {"cpu_cut_faces_host", "cpu_isolation", "cpu_lockstep_host", "h200_baselines", "h200_fronts", "h200_geometry",
+               "h200_guests", "h200_kit_summary", "h200_solver_every_frame", "mutation_testing"}
 LATEST = {"cutproof.fuzz": 4, "cutproof.bench": 3, "cutproof.judge": 1}
 
 
@@ -39,8 +38,8 @@ def made(file, page):
 
 
 files = sorted(results.glob("*.json"))
-assert len(files) > 100, f"{len(files)} files in {results}"
-refused = inner = 0
+assert len(files) > 30, f"{len(files)} files in {results}"
+refused = 0
 for file in files:
     page = work / (file.stem + ".html")
     done = made(file, page)
@@ -51,7 +50,7 @@ for file in files:
         print(f"no page: {said.strip()}")
         # The remedy holds: what such a file has within it, as a file of its own, makes a page; a run's needs a recording.
         within = json.loads(file.read_text())
-        held = within.get("runs", []) if "runs" in within else list(within.get("judged", within).values())
+        held = list(within.get("judged", {}).values())
         for one in held:
             if not isinstance(one, dict) or not one.get("format", "").startswith("cutproof."):
                 continue
@@ -62,7 +61,6 @@ for file in files:
             assert not is_run or "give the recording as well" in done.stdout + done.stderr, done.stderr
             if not is_run and not is_other:
                 assert shown_in(page)["sheets"][0]["holds"] == one["holds"], file
-                inner += 1
         page.unlink(missing_ok=True)
         continue
     document = json.loads(file.read_text())
@@ -92,5 +90,5 @@ for file in files:
         assert outcomes.count("given up as more expensive") == late, file
     page.unlink()
 shown = len(files) - len(COLLECTIONS) - refused
-assert shown > 80 and refused > 60 and inner > 40, (shown, refused, inner)
-print(f"{len(files)} files: {shown} pages, and {inner} of what collections hold; {refused} of other versions refused")
+assert shown > 15 and refused > 5, (shown, refused)
+print(f"{len(files)} files: {shown} pages; {refused} of other versions refused")
