@@ -488,7 +488,7 @@ def self_test():
         shutil.copytree(ROOT / "results", root / "results")
         page = root / "docs/results/mutation_testing.md"
         sound = page.read_text(encoding="utf-8")
-        stray = root / "results/h200_stray.json"
+        stray = root / "results" / "h200_stray.json"
         changes = {
             "nothing": (0, lambda: None),
             "a changed figure": (1, lambda: page.write_text(re.sub(r"\d+ \|\n<!-- end", "1 |\n<!-- end", sound, count=1))),
