@@ -85,8 +85,8 @@ def status(read):
         one = read(name)
         devices = one.get("devices") or [0]
         rows.append([f"random {'moving cases' if one['dynamics'] else 'dissections'}",
-                     f"`cutproof fuzz --backend {one['backend']}{' --dynamics' if one['dynamics'] else ''} "
-                     f"--cases {one['cases_asked']} --seed {one['seed']}`",
+                     f"`cutproof fuzz --backend {one['backend']}{' --devices all' if len(devices) > 1 else ''}"
+                     f"{' --dynamics' if one['dynamics'] else ''} --cases {one['cases_asked']} --seed {one['seed']}`",
                      where if len(devices) == 1 else f"{len(devices)} {where}",
                      f"{len(one['violations'])} violations in {one['verdicts']:,} verdicts; {one['seconds']:.0f} s"])
     kit = read("h200_kit_summary")
@@ -111,7 +111,8 @@ def status(read):
                  "`cutproof tune SCENE --full --reference substeps`", "H200", "[front](accuracy.md#the-front-on-an-h200)"])
     campaigns = [row for row in read("h200_campaigns")["rows"] if row["backend"] == "gpu"]
     rows.append(["cases a second", "`cutproof bench campaigns --backend gpu`", "H200",
-                 "; ".join(f"{row['campaign']} {figure(row['cases_per_second'])}" for row in campaigns)])
+                 "; ".join(f"{'moving, ' if row['dynamics'] else ''}{figure(row['mean_particles'], 1)} particles: "
+                           f"{figure(row['cases_per_second'])}" for row in campaigns)])
     rows.append(["least error rejected", "`cutproof bench sensitivity --backend gpu`", "H200",
                  "[sensitivity](accuracy.md#sensitivity)"])
     mutants = read("mutation_testing")["rows"]
