@@ -5,6 +5,10 @@ Usage: extract_results.py fronts TUNE.json...      of `cutproof tune SCENE --ful
        extract_results.py lockstep RUN.json...     of `cutproof run SCENE --backend host --against reference --mode lockstep`
        extract_results.py cut_faces RUN.json...    of `cutproof run SCENE --backend host --errors geometry`, with
                                                    `--set detect.remove=R --set skin.fit_cuts=F` and in files SCENE.R.F.json
+       extract_results.py geometry RUN.json...     of `cutproof run SCENE --backend gpu --errors geometry --set detect.remove=R`, at
+                                                   several sizes
+       extract_results.py baselines BENCH.json...  of `cutproof bench baselines --backend gpu --particles N --seed S`
+       extract_results.py solver RUN.json...       of `cutproof run SCENE --backend gpu --errors solver --error-frames 10000`
        extract_results.py isolation TEXT           of what `isolation_sweep --bodies 6000 --seed 1` prints
 Then ci/results.sh makes the tables.
 """
@@ -61,6 +65,46 @@ def cut_faces(documents):
                                             "--set skin.fit_cuts=F", "left_out": "verdicts, what each frame did"}, "rows", rows)
 
 
+def geometry(documents):
+    rows = []
+    for _, document in documents:
+        remove = next(change.split("=")[1] for change in document["changes"] if change.startswith("--set detect.remove="))
+        others = [change for change in document["changes"] if not change.startswith(("--set detect.remove=", "--particles"))]
+        kept = ("cut_area", "lost_per_area", "least_per_area", "hausdorff", "skin_rms")
+        rows.append({"scene": document["scene"], "particles": document["body"]["particles"], "remove": remove,
+                     **({"changes": document["changes"]} if others else {}),
+                     **{key: document["errors"]["geometry"][key] for key in kept}})
+    write("h200_geometry", {"command": "cutproof run SCENE --errors geometry --backend gpu --set detect.remove=R --particles N",
+                            "left_out": "verdicts, times, what each frame did"}, "runs", rows)
+
+
+def baselines(documents):
+    rows = []
+    for _, document in documents:
+        for row in document["rows"]:
+            rows.append({"particles": document["particles_asked"], "seed": document["seed"], "name": row["name"],
+                         "remove": row["settings"]["remove"], "holds": document["holds"],
+                         **{key: row[key] for key in ("components", "couplings", "isolated", "equal")},
+                         **{key: row["geometry"][key] for key in ("lost_per_area", "least_per_area", "hausdorff", "skin_rms")},
+                         "interpenetration": row["interpenetration"]["volume"]})
+    write("h200_baselines", {"command": "cutproof bench baselines --backend gpu --particles N --seed S",
+                             "device": documents[0][1]["device"], "left_out": "times, settings that a name says"}, "rows", rows)
+
+
+def solver(documents):
+    rows = []
+    for _, document in documents:
+        error = document["errors"]["solver"]
+        by = [frame["solved_by"] for frame in error["frames"]]
+        energies = [frame["energy"] for frame in error["frames"] if frame["energy"] is not None]
+        rows.append({"scene": document["scene"], "particles": document["body"]["particles"], "frames": len(by),
+                     "converged": sum(frame["converged"] for frame in error["frames"]),
+                     "solved_by": {what: by.count(what) for what in sorted(set(by), key=str)}, "max_h": error["max"],
+                     "rms_h": error["rms"], "greatest_energy": max(energies, default=None)})
+    write("h200_solver_every_frame", {"command": "cutproof run SCENE --backend gpu --errors solver --error-frames 10000",
+                                      "left_out": "what each frame did, but for the greatest"}, "scenes", rows)
+
+
 def isolation(text):
     # ratio, runs, then a count and a percentage of each of four
     line = re.compile(r"^ +([\d.]+|boxes) +(\d+)" + r" +(\d+) +[\d.]+ %" * 4, re.MULTILINE)
@@ -70,7 +114,8 @@ def isolation(text):
 
 
 def main(arguments):
-    makers = {"fronts": fronts, "lockstep": lockstep, "cut_faces": cut_faces}
+    makers = {"fronts": fronts, "lockstep": lockstep, "cut_faces": cut_faces, "geometry": geometry, "baselines": baselines,
+              "solver": solver}
     if len(arguments) < 2 or arguments[0] not in {*makers, "isolation"}:
         sys.exit(__doc__)
     files = [pathlib.Path(file) for file in arguments[1:]]
