@@ -83,7 +83,8 @@ def tables():
     for what, file, pattern, used in CONSTANTS:
         found = re.findall(pattern, (ROOT / file).read_text(encoding="utf-8"))
         if len(found) != 1:
-            sys.exit(f"{file}: {len(found)} places match {pattern}, and one was looked for: change ci/make_defaults.py")
+            print(f"{file}: {len(found)} places match {pattern}, and one was looked for: change ci/make_defaults.py")
+            sys.exit(2)
         text = found[0].replace("'", "")
         value = float.fromhex(text) if text.startswith("0x") else float(text)
         lines.append(f"| {what} | {number(value)} | {used} |")

@@ -115,7 +115,7 @@ std::vector<Pose> match_shapes(const Body& body, const Memberships& memberships,
   return poses;
 }
 
-// g_i: where its clusters would have particle i, on average. A particle in no cluster stays where it is.
+// g_i: where its clusters would have particle i, on average. In no cluster a particle has its own place as its goal.
 Vec3 goal(const Body& body, const Memberships& memberships, const Clusters& clusters, const std::vector<Pose>& poses,
           int32_t i, Vec3 x) {
   if (memberships.count(i) == 0) return x;

@@ -92,7 +92,7 @@ CUTPROOF_DEVICE void advance_loose(Block& block, const DeviceView& w, int o, int
     for (int t = 0; t < kAhead; ++t) ahead[t] = holder_at(t);
   }
   block.wait_for_earlier();  // for the clusters; all else is older
-  Float3 pull = at - from;   // a particle in no cluster stays where it is
+  Float3 pull = at - from;   // of a particle in no cluster: its own place is its goal
   if (clusters > 0) {
     Float3 sum;
     // Several are read at once: one by one, each would wait for the one before.
