@@ -24,7 +24,8 @@ def literal(text):
 
 *given, out = sys.argv[1:]
 html, style, script = (pathlib.Path(name).read_bytes() for name in given)
-# Nothing in a script or a style may end its element.
+# Nothing in a script or a style may end its element. In a text of a script, \! is an exclamation mark.
+script = script.replace(b"<!--", b"<\\!--")
 for name, text in (("script", script), ("style", style)):
     if re.search(rb"</" + name.encode() + rb"|<!--", text, re.I):
         sys.exit(f"embed.py: the {name} holds what would end its element")

@@ -11,7 +11,7 @@ const pages = { 'method.md': method, 'tolerances.md': tolerances, 'oracles.md': 
 
 // Of a page: the lines of the section whose heading begins so, with those below it; null if there is none.
 function sectionOf(page, begin) {
-  const lines = pages[page].split('\n');
+  const lines = pages[page].split('\n').filter((line) => !line.startsWith('<!--'));
   const level = (line) => (line.match(/^#+(?= )/) || [''])[0].length;
   const first = lines.findIndex((line) => level(line) > 1 && line.replace(/^#+ /, '').toLowerCase().startsWith(begin.toLowerCase()));
   if (first < 0) return null;
