@@ -41,6 +41,12 @@ LONG = (
     (r"Screen\.(IsNotLeftByAnyVerb|OnATerminal)", "a line that is too long in what a whole campaign or suite prints"),
     (r"Interrupted\.(TuneWritesWhatItHasTried|EverySuiteOfBenchWritesItsDocumentHoweverEarly)",
      "a document that an interrupted search or suite does not write"),
+    (r"Screen\.ShowsWhatFailsFirst.*", "a first failure that a long run does not name first"),
+    (r"Interrupted\.ASecondSignalEndsARun.*", "files that a run leaves behind after two signals"),
+    (r"Page\.IsUnderTwoMegabytes.*", "a page of a large scene that is too large"),
+    (r"Report\.PreviewInABrowser", "what a page without a run shows"),
+    (r"RotationMethods\.BesideTheDefault.*", "a method of rotations that nobody chose, and that is wrong"),
+    (r"VectorsTest\.AreRefusedOrJudgedWhateverValuesTheyHave", "a value of a file of vectors that ends the program"),
     (r"JudgeVerb\.JudgesStagesToo|Reports\.OfEveryVerbThatJudges", "a verb that reports what it judged wrongly"),
 )
 
