@@ -10,7 +10,9 @@
 #include <filesystem>
 #include <fstream>
 #include <set>
+#include <sstream>
 #include <string>
+#include <system_error>
 #include <vector>
 
 namespace files = std::filesystem;
@@ -48,10 +50,7 @@ class Program : public testing::Test {
   static std::string scene(const std::string& name) {
     return (files::path(CUTPROOF_SOURCE) / "fixtures/scenes" / (name + ".json")).string();
   }
-  // `environment`: variables for the program, as a shell writes them.
-  Outcome cutproof(const std::string& arguments, const std::string& environment = "") const {
-    const std::string command =
-        "cd '" + folder_.string() + "' && " + environment + " '" CUTPROOF_PROGRAM "' " + arguments + " 2>&1";
+  static Outcome shell(const std::string& command) {
     FILE* pipe = popen(command.c_str(), "r");
     Outcome outcome;
     std::array<char, 4096> buffer;
@@ -60,6 +59,32 @@ class Program : public testing::Test {
     const int status = pclose(pipe);
     outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
     return outcome;
+  }
+  // `environment`: variables for the program, as a shell writes them. A document that it writes follows its schema.
+  Outcome cutproof(const std::string& arguments, const std::string& environment = "") const {
+    const std::string document = document_of(arguments);
+    const files::file_time_type before = time_of(document);
+    const Outcome outcome =
+        shell("cd '" + folder_.string() + "' && " + environment + " '" CUTPROOF_PROGRAM "' " + arguments + " 2>&1");
+    if (time_of(document) != before) expect_schema(document);
+    return outcome;
+  }
+  // The file that --json names; empty if it needs quotes.
+  std::string document_of(const std::string& arguments) const {
+    std::istringstream words(arguments);
+    for (std::string word; words >> word;) {
+      if (word == "--json" && words >> word && word.find('\'') == std::string::npos) return path(word);
+    }
+    return "";
+  }
+  // When it was written last; the least of times if there is none.
+  static files::file_time_type time_of(const std::string& file) {
+    std::error_code error;
+    return files::is_regular_file(file, error) ? files::last_write_time(file, error) : files::file_time_type::min();
+  }
+  static void expect_schema(const std::string& document) {
+    const Outcome outcome = shell("/usr/bin/python3 '" CUTPROOF_SOURCE "/tests/cli/schemas.py' '" + document + "' 2>&1");
+    EXPECT_EQ(outcome.status, 0) << outcome.output;
   }
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
   void write(const std::string& name, const std::string& text) const {

@@ -21,7 +21,10 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 sys.path.insert(0, str(ROOT / "guests" / "python"))
 import cutproof  # noqa: E402
 import cutproof_run  # noqa: E402
+sys.path.insert(0, str(ROOT / "tests" / "cli"))
+from schemas import Schemas, in_words  # noqa: E402
 
+SCHEMAS = Schemas()
 SIMULATORS = ("springs", "tetrahedra", "material_points", "clusters")
 ACROSS, WITHIN = "no coupling across pieces", "pieces coupled within"
 # By fault: the property that has to fail, of all simulators or by simulator; others may fail as well.
@@ -66,14 +69,19 @@ class JudgedRuns(unittest.TestCase):
             _, status, used = os.wait4(program.pid, 0)
         program.returncode, self.memory = os.waitstatus_to_exitcode(status), 1024 * used.ru_maxrss
         self.assertIn(program.returncode, (0, 1), errors.read_text())
-        return program.returncode, json.loads(document.read_text()), text
+        return program.returncode, self.read(document), text
 
     def relate(self, *arguments):
         document = self.folder / "related.json"
         done = subprocess.run([os.environ["CUTPROOF"], "relate", *arguments, "--json", document], capture_output=True,
                               text=True)
         self.assertIn(done.returncode, (0, 1), done.stderr)
-        return done.returncode, json.loads(document.read_text()), done.stdout
+        return done.returncode, self.read(document), done.stdout
+
+    def read(self, file):
+        document = json.loads(file.read_text())
+        self.assertEqual([in_words(error) for error in SCHEMAS.errors(document)], [])
+        return document
 
     def failed(self, document):
         return [verdict["property"] for verdict in document["verdicts"] if not verdict["holds"]]

@@ -309,18 +309,22 @@ TEST(AColumn, IsWrittenAsATerminalAndAsAPageDoes) {
 }
 
 TEST(AColumn, IsOfFieldsThatArePartOfTheFormat) {
-  std::ifstream file(CUTPROOF_SOURCE "/docs/reference/results_schema.md");
-  const std::string page{std::istreambuf_iterator<char>(file), {}};
+  const auto schema = [](const std::string& name) {
+    std::ifstream file(CUTPROOF_SOURCE "/docs/reference/schemas/" + name + ".json");
+    return std::string{std::istreambuf_iterator<char>(file), {}};
+  };
+  const std::string common = schema("common") + schema("errors");
   int named = 0;
   for (const Suite* const suite : kSuites) {
-    EXPECT_NE(page.find(std::string("## `cutproof bench ") + suite->name + "`"), std::string::npos) << suite->name;
+    const std::string own = schema(std::string("bench_") + suite->name), all = own + common;
+    EXPECT_NE(own, "") << suite->name;
     for (const RowColumn& column : suite->columns()) {
       const auto* const text = std::get_if<std::string>(&column.cell);
       if (!text) continue;
       io::filled(*text, [&](const std::string& path, double, const std::string&) {
         std::istringstream names(path);
         for (std::string name; std::getline(names, name, '/'); ++named)
-          EXPECT_NE(page.find("`" + name + "`"), std::string::npos)
+          EXPECT_NE(all.find("\"" + name + "\": {"), std::string::npos)
               << suite->name << ", " << column.head << ": " << name;
         return std::string();
       });
