@@ -38,7 +38,8 @@ ReadyScene make_baseline_scene(const Baseline& baseline, int64_t particles, uint
 // to state.removed. The skin is dropped, so that the next skin stage makes it anew. Requires a state after detection.
 void delete_from_clusters(const Setup& setup, Deletion deletion, State& state);
 
-// Its row of the document (results_schema.md). Seconds with a deletion: of step, detect and skin.
+// Its row of the document (docs/reference/schemas/bench_baselines.json). Seconds with a deletion: of step, detect and
+// skin.
 nlohmann::json run_baseline(Backend& backend, const Baseline& baseline, const ReadyScene& scene);
 
 }  // namespace cutproof::benchmarks

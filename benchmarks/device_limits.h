@@ -1,4 +1,4 @@
-// What the device can do at best, measured: times are given as multiples of these (results_schema.md,
+// What the device can do at best, measured: times are given as multiples of these (json.md,
 // cutproof bench machine_limits).
 #pragma once
 #include <cstdint>

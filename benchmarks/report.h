@@ -1,4 +1,4 @@
-// The document that a suite of `bench`, or `tune`, leaves: results_schema.md says what each field means.
+// The document that a suite of `bench`, or `tune`, leaves: docs/reference/schemas/ says what each field means.
 #pragma once
 #include <functional>
 #include <memory>

@@ -10,7 +10,7 @@
 namespace cutproof::benchmarks {
 
 struct ScenePart {
-  std::string name;  // as results_schema.md lists them (`cutproof bench parts`)
+  std::string name;  // docs/reference/schemas/bench_parts.json lists them
   Scene without;     // has everything else
   // Clusters are cooked by it, too: so that nothing else differs, a run without it begins with those of the scene as it
   // is.

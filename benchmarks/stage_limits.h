@@ -1,5 +1,5 @@
 // What a frame's stages cannot do without: memory traffic, kernels that wait for one another, and what both take at
-// best (results_schema.md, The limits of stages).
+// best (json.md, The limits of stages).
 #pragma once
 #include <array>
 #include <cstdint>

@@ -1,4 +1,4 @@
-// `cutproof run --against reference`: how a comparison is printed and written (docs/reference/results_schema.md).
+// `cutproof run --against reference`: how a comparison is printed and written (docs/reference/schemas/against.json).
 #pragma once
 #include <nlohmann/json.hpp>
 #include <string>

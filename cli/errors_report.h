@@ -1,5 +1,5 @@
 // `cutproof run --errors`: which errors are asked for, and how they are printed and written
-// (docs/reference/results_schema.md).
+// (docs/reference/schemas/errors.json).
 #pragma once
 #include <nlohmann/json.hpp>
 #include <string>

@@ -20,7 +20,7 @@ fixtures::OnRepairStep repair_progress();
 
 // Nothing if nothing was repaired and there is nothing to note.
 void print_build(const fixtures::BuildReport& built);
-// docs/reference/results_schema.md, The build.
+// docs/reference/json.md, The build.
 nlohmann::json build_json(const fixtures::BuildReport& built);
 
 void print_examination(const fixtures::MeshExamination& mesh, const std::string& unit);

@@ -1,4 +1,4 @@
-// --json: the machine's interface; results_schema.md describes every field.
+// --json: the machine's interface; docs/reference/schemas/ describes every field.
 #pragma once
 #include <cstdint>
 #include <nlohmann/json.hpp>

@@ -49,7 +49,7 @@ class FreeRunning {
   // difference.
   void see(Stage stage, const State& after);
 
-  // "free-running: decisions"; see docs/reference/results_schema.md.
+  // "free-running: decisions"; see json.md, Comparison with the reference.
   Verdict verdict() const;
 
   const std::vector<FreeFrame>& frames() const { return frames_; }

@@ -1,4 +1,4 @@
-// Figures of a cut in result documents (docs/reference/results_schema.md); null where something is absent.
+// Figures of a cut in result documents (docs/reference/schemas/errors.json); null where something is absent.
 #pragma once
 #include <nlohmann/json.hpp>
 

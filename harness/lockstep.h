@@ -51,7 +51,8 @@ class Lockstep {
   // From now on: told what the reference has made of the backend's state, of every stage that the backend launched.
   void observe_reference(std::function<void(Stage, const State&)> observer) { observer_ = std::move(observer); }
 
-  // One verdict for each thing that was measured, over the whole run so far; see docs/reference/results_schema.md.
+  // One verdict for each thing that was measured, over the whole run so far (json.md, Comparison with the
+  // reference).
   std::vector<Verdict> verdicts() const;
 
   const std::vector<LockstepFrame>& frames() const { return frames_; }

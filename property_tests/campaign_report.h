@@ -1,5 +1,5 @@
-// Campaigns as documents (results_schema.md, fuzz): one for each shard, put together to one of the whole, and what
-// follows from it.
+// Campaigns as documents (docs/reference/schemas/fuzz.json): one for each shard, put together to one of the whole, and
+// what // follows from it.
 #pragma once
 #include <nlohmann/json.hpp>
 #include <string>

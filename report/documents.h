@@ -1,4 +1,4 @@
-// Documents that are results of campaigns and measurements, as sheets of a page (results_schema.md).
+// Documents that are results of campaigns and measurements, as sheets of a page (json.md).
 #pragma once
 #include <nlohmann/json.hpp>
 #include <string>
@@ -12,7 +12,7 @@ enum class DocumentKind { run, fuzz, judge, bench, tune, counterexample };
 DocumentKind kind_of(const nlohmann::json& document, const std::string& file);
 
 // Of a document of fuzz, judge, bench or tune. Throws InputError, naming file and field, for anything that is not as
-// results_schema.md has it, and for any format version but the one that this program writes. `failure`: what is wrong
+// json.md has it, and for any format version but the one that this program writes. `failure`: what is wrong
 // with a campaign as a whole, as a sentence without an end (property_tests/campaign_report.h); empty: nothing.
 Sheet sheet_of(const nlohmann::json& document, const std::string& file, const std::string& failure = {});
 

@@ -1,4 +1,4 @@
-// What a run or a check came to, from its document (results_schema.md), as a page shows it.
+// What a run or a check came to, from its document (json.md), as a page shows it.
 #pragma once
 #include <cstdint>
 #include <nlohmann/json.hpp>

@@ -43,7 +43,7 @@ struct Trial {
   std::string why;                // what a table says about a trial that is not within
   benchmarks::Times frame;        // seconds per frame of the scene; no samples if it was given up
 };
-// The fields of results_schema.md.
+// The fields of docs/reference/schemas/tune.json.
 nlohmann::json to_json(const Trial& trial, const Configuration& given);
 
 }  // namespace cutproof::tuning

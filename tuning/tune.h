@@ -21,7 +21,8 @@ enum class TuneStep {
   none_verified,  // of those that seemed to be within
   stopped         // before its end, as it was asked to: the document stays incomplete
 };
-// `so_far`: the fields of results_schema.md. `given`: the scene that is tuned, and `built` how it was built.
+// `so_far`: the fields of docs/reference/schemas/tune.json. `given`: the scene that is tuned, and `built` how it was
+// built.
 using TuneProgress = std::function<void(TuneStep step, const nlohmann::json& so_far, const Scene& given,
                                         const fixtures::BuildReport& built)>;
 

@@ -1,4 +1,4 @@
-// The suites of `cutproof bench`: options in, a document out, whose fields results_schema.md describes. All throw
+// The suites of `cutproof bench`: options in, a document out, whose fields docs/reference/schemas/ describes. All throw
 // InputError for options that make no sense, MachineError if the machine fails.
 #pragma once
 #include <cstdint>

@@ -708,7 +708,7 @@ def _find_program():
 
 
 class Result:
-    """Everything holds. `operations`: of judge, by name, with the fields of docs/reference/results_schema.md;
+    """Everything holds. `operations`: of judge, by name, with the fields of docs/reference/schemas/judge.json;
     `document`: the whole; `text`: what the program printed."""
 
     def __init__(self, text, document=None):

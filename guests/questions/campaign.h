@@ -111,7 +111,7 @@ KernelCampaign judge_kernel(Guest& guest, const OperationDescription& operation,
                             const KernelCampaignOptions& options,
                             const std::function<void(const KernelCampaign&)>& progress);
 
-// A question as data, in a line of JSON: replayed without the plugin's source (results_schema.md, Questions).
+// A question as data, in a line of JSON: replayed without the plugin's source (json.md, Questions).
 struct SavedQuestion {
   std::string operation;
   Question question;  // of a large one kind and size alone

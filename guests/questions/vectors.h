@@ -81,7 +81,7 @@ VectorReport judge_vectors(const Vectors& vectors, const AllAnswers& answers, co
 // Where the entries of a case begin in the arrays with one entry for each particle, or matrix.
 int64_t first_row(const Vectors& vectors, int64_t index);
 
-// `cases` and `failures` of the document (results_schema.md).
+// `cases` and `failures` of the document (docs/reference/schemas/check_vectors.json).
 nlohmann::json to_json(const Vectors& vectors, const VectorReport& report);
 
 }  // namespace cutproof::guests

@@ -1,4 +1,4 @@
-// A verdict in a result document, and in words (results_schema.md, Verdicts).
+// A verdict in a result document, and in words (json.md, Verdicts).
 #pragma once
 #include <nlohmann/json.hpp>
 #include <string>

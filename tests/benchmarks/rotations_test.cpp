@@ -46,7 +46,7 @@ void expect_times(const json& seconds) {
   EXPECT_LE(seconds.at("median"), seconds.at("max"));
 }
 
-// What results_schema.md promises, for these methods in these precisions and every case.
+// What docs/reference/schemas/bench_rotations.json promises, for these methods in these precisions and every case.
 void expect_complete(const json& document, const std::set<std::pair<std::string, std::string>>& methods) {
   EXPECT_EQ(document.at("format"), "cutproof.bench");
   EXPECT_EQ(document.at("format_version"), 3);
