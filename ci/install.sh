@@ -7,6 +7,7 @@
 #   libraries   VTK, which tests/guests/libraries_test.cpp judges, and packages of npm, which javascript_test.py does
 #   package     what ci/package.sh needs
 #   fuzzing     what ci/input_fuzzing.sh needs beside the tests
+#   docs        Doxygen, with which ci/docs.sh makes API pages
 #   --list      prints the packages instead
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -32,6 +33,7 @@ browser=(chromium chromium-driver python3-selenium)
 libraries=(libvtk9.1)
 command -v npm >/dev/null || libraries+=(nodejs npm)  # a Node.js from elsewhere brings its own npm
 fuzzing=(clang libclang-rt-dev llvm)  # llvm adds file and line to the reports of sanitizers
+docs=(doxygen)
 
 list=no
 if [ "${1:-}" = --list ]; then
@@ -41,8 +43,8 @@ fi
 packages=()
 for group in program "$@"; do
   case $group in
-    program | tests | browser | libraries | package | fuzzing) declare -n these=$group ;;
-    *) echo "ci/install.sh: \"$group\" is no group of packages; there are: tests, browser, libraries, package, fuzzing" >&2; exit 2 ;;
+    program | tests | browser | libraries | package | fuzzing | docs) declare -n these=$group ;;
+    *) echo "ci/install.sh: \"$group\" is no group of packages; there are: tests, browser, libraries, package, fuzzing, docs" >&2; exit 2 ;;
   esac
   packages+=("${these[@]}")
 done

@@ -24,7 +24,7 @@ import sys
 import tempfile
 
 SOURCE = pathlib.Path(__file__).resolve().parent.parent
-GROUPS = ("tests", "browser")
+GROUPS = ("tests", "browser", "docs")
 PYTHON = "/usr/bin/python3"
 MERGED = {"/bin": "/usr/bin", "/sbin": "/usr/sbin", "/lib": "/usr/lib", "/lib32": "/usr/lib32", "/lib64": "/usr/lib64"}
 ALTERNATIVES = "/etc/alternatives/"

@@ -1,14 +1,17 @@
 #!/usr/bin/env bash
 # Installs what is missing, builds, runs every test, and of the long ones a share that the commit chooses
 # (ci/long_tests.py). The last line is "N passed, N failed, N skipped".
-# CUTPROOF_WHOLE=1: all of the long ones, eight times as many random cases, and kernels for every GPU (ci/nightly.sh).
+# CUTPROOF_WHOLE=1: all of the long ones, eight times as many random cases, kernels for every GPU,
+# and API pages by Doxygen (ci/nightly.sh).
 # CUTPROOF_MESHES: a folder with outside meshes; tests on them say so when it is unset.
 # CUTPROOF_PRESET: another preset of CMakePresets.json (debug, asan, tsan).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 preset=${CUTPROOF_PRESET:-default}
 
-ci/install.sh tests browser
+docs=()
+[ "${CUTPROOF_WHOLE:-}" != 1 ] || docs=(docs)
+ci/install.sh tests browser "${docs[@]}"
 werror=()
 [ "${CI:-}" = true ] && werror=(-DCUTPROOF_WERROR=ON)
 # Where no GPU can run them, kernels are compiled for one kind alone, as fast as that goes.

@@ -1,5 +1,5 @@
 // Campaigns as documents (docs/reference/schemas/fuzz.json): one for each shard, put together to one of the whole, and
-// what // follows from it.
+// what follows from it.
 #pragma once
 #include <nlohmann/json.hpp>
 #include <string>

@@ -83,7 +83,8 @@ class Program : public testing::Test {
     return files::is_regular_file(file, error) ? files::last_write_time(file, error) : files::file_time_type::min();
   }
   static void expect_schema(const std::string& document) {
-    const Outcome outcome = shell("/usr/bin/python3 '" CUTPROOF_SOURCE "/tests/cli/schemas.py' '" + document + "' 2>&1");
+    const Outcome outcome =
+        shell("/usr/bin/python3 '" CUTPROOF_SOURCE "/tests/cli/schemas.py' '" + document + "' 2>&1");
     EXPECT_EQ(outcome.status, 0) << outcome.output;
   }
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
