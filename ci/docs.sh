@@ -12,7 +12,7 @@ command -v doxygen > /dev/null || { echo "ci/docs.sh: Doxygen is not installed: 
 version=$(sed -n 's/^project(cutproof VERSION \([0-9.]*\).*/\1/p' CMakeLists.txt)
 rm -rf "$folder"
 mkdir -p "$folder"
-cat > "$folder/main.md" << 'END'
+cat > "$folder/main.markdown" << 'END'
 # Headers of cutproof
 
 | header | use |
@@ -28,13 +28,13 @@ if ! doxygen - > /dev/null 2> "$folder/warnings.txt" << END
 PROJECT_NAME = cutproof
 PROJECT_NUMBER = $version
 PROJECT_BRIEF = "headers for plugins, runs and other projects"
-INPUT = "$folder/main.md" guests/include model reference_cpu gpu oracles
+INPUT = "$folder/main.markdown" guests/include model reference_cpu gpu oracles
 FILE_PATTERNS = *.h *.cuh
 EXTENSION_MAPPING = cuh=C++
 RECURSIVE = YES
 FULL_PATH_NAMES = YES
 STRIP_FROM_PATH = guests/include .
-USE_MDFILE_AS_MAINPAGE = "$folder/main.md"
+USE_MDFILE_AS_MAINPAGE = "$folder/main.markdown"
 FILTER_PATTERNS = "*.h=/usr/bin/python3 ci/doxygen_comments.py" "*.cuh=/usr/bin/python3 ci/doxygen_comments.py"
 OUTPUT_DIRECTORY = "$folder"
 HTML_OUTPUT = .
@@ -57,6 +57,6 @@ then
   cat "$folder/warnings.txt" >&2
   exit 1
 fi
-rm "$folder/warnings.txt" "$folder/main.md"
+rm "$folder/warnings.txt" "$folder/main.markdown"
 [ -s "$folder/search/all_0.js" ] || { echo "ci/docs.sh: the pages have no search" >&2; exit 1; }
 echo "$folder/index.html"
