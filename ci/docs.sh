@@ -34,6 +34,7 @@ EXTENSION_MAPPING = cuh=C++
 RECURSIVE = YES
 FULL_PATH_NAMES = YES
 STRIP_FROM_PATH = guests/include .
+STRIP_FROM_INC_PATH = guests/include .
 USE_MDFILE_AS_MAINPAGE = "$folder/main.markdown"
 FILTER_PATTERNS = "*.h=/usr/bin/python3 ci/doxygen_comments.py" "*.cuh=/usr/bin/python3 ci/doxygen_comments.py"
 OUTPUT_DIRECTORY = "$folder"
@@ -49,6 +50,7 @@ EXTRACT_STATIC = YES
 HIDE_IN_BODY_DOCS = YES
 EXCLUDE_SYMBOLS = fmt fmt::*
 SHOW_INCLUDE_FILES = NO
+VERBATIM_HEADERS = NO
 HAVE_DOT = NO
 QUIET = YES
 WARN_AS_ERROR = FAIL_ON_WARNINGS

@@ -221,7 +221,12 @@ TEST_F(Fuzz, NamesShardsThatAreMissing) {
   // What fails is said as well, by index whatever the order of the files.
   for (const auto& [shard, index] : {std::pair{"3", 11}, {"6", 5}}) {
     document = result(std::string(shard) + ".json");
-    document["violations"] = {{{"index", index}, {"text", "'coverage' fails"}, {"file", "x.json"}}};
+    document["violations"] = {{{"index", index},
+                               {"property", "coverage"},
+                               {"stage", "split"},
+                               {"text", "'coverage' fails"},
+                               {"witness", ""},
+                               {"file", "x.json"}}};
     write(std::string(shard) + ".json", document.dump());
   }
   const Outcome failing = cutproof("fuzz --merge 3.json 6.json --json merged.json");
