@@ -64,7 +64,7 @@ class Program : public testing::Test {
   Outcome cutproof(const std::string& arguments, const std::string& environment = "") const {
     const std::string document = document_of(arguments);
     const files::file_time_type before = time_of(document);
-    const Outcome outcome =
+    Outcome outcome =
         shell("cd '" + folder_.string() + "' && " + environment + " '" CUTPROOF_PROGRAM "' " + arguments + " 2>&1");
     if (time_of(document) != before) expect_schema(document);
     return outcome;
