@@ -139,10 +139,10 @@ def judged(program):
     (program.folder / "then.json").write_text(json.dumps(run("run wrong.json --check --record wrong", status=1)))
     run("run wrong.json --check --baseline then.json")
     run("run small.json --check --backend", f"plugin:{sys.argv[4]}")
-    run("run", str(scenes / "small_block.json"), "--check", "topology", "--mesh", "open.off", "--unit", "cm", "--repair",
-        "--repair-change", "1", "--spacing", "0.001", "--frames", "2")
-    run("run", str(scenes / "three_cuts.json"), "--check", "--frames", "25", "--backend", "host", "--against", "reference",
-        "--errors", "all")
+    run("run", str(scenes / "small_block.json"), "--check", "topology", "--mesh", "open.off", "--unit", "cm",
+        "--repair", "--repair-change", "1", "--spacing", "0.001", "--frames", "2")
+    run("run", str(scenes / "three_cuts.json"), "--check", "--frames", "25", "--backend", "host", "--errors", "all",
+        "--against", "reference")
     run("check small")
     run("check wrong --check topology --baseline then.json")
     run("info --mesh closed.off")
