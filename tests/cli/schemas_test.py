@@ -217,7 +217,7 @@ def measured(program):
 def stored(schemas, sources):
     """Documents of today's versions: what they lack may have come later, and some fields have gone."""
     of_today, others = collections.Counter(), 0
-    for file in sorted([*sources.glob("results/**/*.json"), *sources.glob("docs/results/*.json")]):
+    for file in sorted((sources / "results").glob("*.json")):
         document = json.loads(file.read_text())
         known = isinstance(document, dict) and "format" in document and schemas.all.get(name_of(document))
         if not known or known["properties"]["format_version"]["const"] != document.get("format_version"):
