@@ -64,6 +64,7 @@ json without_times(const std::string& text) {
     frame.erase("seconds");
     frame.erase("total_seconds");
   }
+  for (json& property : document["properties"]) property.erase("seconds");
   return document;
 }
 
