@@ -166,9 +166,8 @@ std::string scene_schema() {
   ordered_json schema = {{"$schema", "http://json-schema.org/draft-07/schema#"},
                          {"title", "A scene of cutproof"},
                          {"description",
-                          "What `cutproof info --schema` prints, for editors: fields, their bounds and "
-                          "defaults. What it cannot say, such as that two walls leave room, the reader "
-                          "checks."}};
+                          "Fields, bounds and defaults, for editors; `cutproof info --schema` prints this schema. The "
+                          "reader of scenes checks more, such as that two walls leave room."}};
   schema.update(Schemer().of(scene));
   schema["definitions"][kShape] = schema_of_shapes();
   return schema.dump(1) + "\n";

@@ -1,4 +1,4 @@
-// Writes a scene, and what its fields are, for people.
+// Writes a scene, and documents its fields.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -87,7 +87,7 @@ std::string on_one_line(const ordered_json& value) {
   return value.dump();
 }
 
-// Indented, but what is short stays on one line: three numbers are one thing to a reader.
+// Indented; short arrays and objects stay on one line.
 std::string pretty(const ordered_json& value, std::size_t indent) {
   std::string line = on_one_line(value);
   const bool whole_scene = indent == 0;
@@ -133,14 +133,14 @@ std::string interval_text(const Bounds& b) {
                      b.open_high ? ")" : "]");
 }
 
-// Of numbers an interval, of lists and texts how many entries or bytes.
+// The interval of a number, the greatest count of entries of a list or bytes of a text.
 std::string limits_text(const SceneField& f, bool is_list) {
   const std::string interval = interval_text(f.bounds), in = interval.empty() ? "" : ", in " + interval;
   if (f.most == 0) return in;
   return fmt::format("{}, at most {} {}", in, f.most, is_list ? "entries" : "bytes");
 }
 
-// The list of one object, and below it those of the objects in it.
+// The section of one object, followed by those of the objects in it.
 template <class T>
 std::string section(const std::string& path, T& value);
 
@@ -197,39 +197,37 @@ std::string section(const std::string& path, T& value) {
 constexpr std::string_view kReferenceHead =
     R"(# Scenes
 
-This page is what `cutproof info --scene` prints: it is generated from the table
-of fields that also reads and checks scenes, and a test sees to it that the two
-are equal. Of each field: its type with its unit, what stands for it where it is
-absent, and its bounds.
+`cutproof info --scene` prints this page from the table of fields that reads and
+checks scenes; a test compares the two. Each field has type and unit, default,
+and bounds.
 
-A scene is a JSON file (UTF-8, no comments). It says what is cut, how it is
-simulated, what the blade does, and what must come out. A whole one, `cylinder`,
-is drawn in judge_a_run.md, A scene of your own. Fields that are absent have
-their default; a field that is not listed here, or that is given twice, is an
-error, and so is a value out of bounds. Units are SI unless stated:
+A scene is a JSON file (UTF-8, no comments): a body, the parameters of a
+simulation, the path of a blade, and expectations. judge_a_run.md, A scene of
+your own, shows a complete one, `cylinder`. An absent field has its default. A
+field that is not listed, a field given twice and a value out of bounds are
+errors. Units are SI unless stated:
 
 - **box**: coordinates in the bounding box of the body's particles at rest,
-  after alignment: (0, 0, 0) is its lower corner and (1, 1, 1) its upper one,
-  half a spacing beyond the outermost particles. Points may lie outside. A path
-  in these coordinates runs on any organ.
+  after alignment. (0, 0, 0) is the lower corner of this box and (1, 1, 1) the
+  upper one, half a spacing beyond the outermost particles. Points may lie
+  outside. A path in box coordinates fits any organ.
 - **h**: the spacing of the background grid. **extents**: multiples of the
   bounding box's width along a direction.
 - Directions (`back`, `along`, `velocity`, `gravity`) are metric and in the
   body's frame.
 - A **range** is a number (exactly that), or `{"at_least": a}`, `{"at_most":
   b}`, or both.
-- In bounds, a square bracket includes the number and a round one does not. They
-  hold for each component of a vector, each entry of a list and both ends of a
-  range.
+- In bounds, a square bracket includes the number and a round one excludes it.
+  Bounds hold for each component of a vector, each entry of a list and both ends
+  of a range.
 
-Time is divided into frames of `frame.length`, and these into `step.substeps`.
-With a dynamic criterion (anything but `geometric`), a frame in which the blade
-would be too fast for its own thickness is divided into the least number of
-equal shorter frames in which, per substep, no corner of the blade moves by more
-than 1.001 · max(thickness, epsilon · h) / 2, and none moves, by turning, by
-more than half of the shorter of length and depth (method.md §3, Blade). With
-`detect.every` = `substep` each of these frames is laid out as as many frames of
-one substep.
+Time is divided into frames of `frame.length`, and frames into `step.substeps`.
+If the blade is too fast for its thickness, a frame is divided into as few equal
+shorter frames as suffice (not with `geometric`). In each substep no corner of
+the blade then moves by more than 1.001 · max(thickness, epsilon · h) / 2. By
+turning alone, no corner moves by more than half of the shorter of length and
+depth (method.md §3, Blade). With `detect.every` = `substep`, each of these
+frames becomes `step.substeps` frames of one substep.
 )";
 
 }  // namespace
