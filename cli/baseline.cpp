@@ -125,7 +125,8 @@ std::string in_words(const std::vector<Entry>& entries) {
 }  // namespace
 
 void add_baseline(CLI::App& command, std::string& path) {
-  command.add_option("--baseline", path, "what --json has written before: what fails in it, too, does not count")
+  command
+      .add_option("--baseline", path, "an earlier --json result of the same command; its failures do not count again")
       ->type_name("F");
 }
 

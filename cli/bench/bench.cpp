@@ -122,16 +122,15 @@ void add_timing(CLI::App& command, benchmarks::TimingOptions& options) {
   add_backend_name(command, options.backend, "backend under test", is_timed);
   add_count(command, "--frames", options.frames, "timed frames of each repeat (default: by backend)",
             whole_number(1, 10'000));
-  add_count(command, "--repeats", options.repeats, "how often they are timed, each time after a warm-up",
-            whole_number(1, 1'000));
+  add_count(command, "--repeats", options.repeats, "timed repeats, each after a warm-up", whole_number(1, 1'000));
   add_list(command, "--acceleration", options.acceleration,
            options.acceleration.empty() ? "none, chebyshev or both, instead of the scene's" : "none, chebyshev or both",
            "A");
-  add_count(command, "--iterations", options.iterations, "of a substep, instead of the scene's",
+  add_count(command, "--iterations", options.iterations, "iterations per substep, instead of the scene's",
             whole_number(1, 1'000'000));
   command
       .add_option("--remove", options.remove,
-                  "ends of an edge that is too long: both, one or nearer, instead of the scene's")
+                  "ends that a too long edge loses: both, one or nearer, instead of the scene's")
       ->type_name("E")
       ->check(one_of({"both", "one", "nearer"}));
 }

@@ -14,9 +14,8 @@ void print_row_of_campaigns(const json& document) {
 
 void print_campaigns(const json& document) {
   say_as_it_is("\n" + table_of(document.at("rows"), columns_of(report::kCampaignsSuite), 2));
-  say("shares are of the time of all threads: simulating is what they wait for a device, too; max [h]: greatest "
-      "distance "
-      "of a position after a step from the reference's\n");
+  say("shares: of the time of all threads; simulating includes waiting for a device; max [h]: greatest distance of a "
+      "position after a step from the reference's\n");
 }
 
 }  // namespace
@@ -25,21 +24,22 @@ void add_campaigns(CLI::App& bench, Work& work) {
   const auto options = std::make_shared<benchmarks::CampaignsOptions>();
   options->stop_asked = stop_asked;
   CLI::App* const command =
-      bench.add_subcommand("campaigns", "cases a second of `fuzz`, and where their time goes, beside the reference's");
+      bench.add_subcommand("campaigns", "cases per second of `fuzz`, and shares of its phases, beside the reference's");
   add_backend_name(*command, options->backend, "backend under test", is_timed);
-  add_list(*command, "--kinds", options->kinds, "small, large and moving cases", "K");
-  command->add_option("--seconds", options->seconds, "of each campaign")
+  add_list(*command, "--kinds", options->kinds, "kinds of cases: small, large, moving", "K");
+  command->add_option("--seconds", options->seconds, "seconds of each campaign")
       ->capture_default_str()
       ->type_name("S")
       ->check(number_from(0));
-  add_count(*command, "--cases", options->cases, "of each campaign, however long they take",
+  add_count(*command, "--cases", options->cases, "cases of each campaign, instead of a time",
             whole_number(1, 1'000'000'000));
-  add_seed(*command, options->seed, "what cases are drawn from");
-  add_count(*command, "--batch", options->batch, "bodies in one load (default: by backend and size)",
+  add_seed(*command, options->seed, "seed of the cases");
+  add_count(*command, "--batch", options->batch, "bodies in a batch (default: by backend and size)",
             whole_number(1, 100'000));
-  add_count(*command, "--threads", options->threads, "that generate and judge (default: all)", whole_number(1, 4096));
+  add_count(*command, "--threads", options->threads, "threads that generate and judge (default: all)",
+            whole_number(1, 4096));
   add_devices(*command, options->devices);
-  add_suite(*command, work, "write rates, times and what was compared",
+  add_suite(*command, work, "write rates, times and comparisons as JSON",
             {.run = [options](const auto& progress) { return run_campaigns(*options, progress); },
              .row = print_row_of_campaigns,
              .end = print_campaigns});

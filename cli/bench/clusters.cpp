@@ -67,13 +67,12 @@ void print_tables(const json& document) {
 
 void add_clusters(CLI::App& bench, Work& work) {
   const auto options = std::make_shared<benchmarks::ClustersOptions>();
-  CLI::App* const command =
-      bench.add_subcommand("clusters", "how the number of clusters changes during a cut: Fig. 10");
+  CLI::App* const command = bench.add_subcommand("clusters", "number of clusters during a cut: Fig. 10");
   add_backend_name(*command, options->backend, "backend under test", is_timed);
-  add_list(*command, "--tau", options->taus, "below which multiple of the median size a cluster is small", "T");
-  add_count(*command, "--particles", options->particles, "of the kidney", whole_number(500, 100'000'000));
-  command->add_flag("--full", options->full, "37,704 particles, as always on a device");
-  add_suite(*command, work, "write curves, times and errors",
+  add_list(*command, "--tau", options->taus, "multiples of the median size below which a cluster is small", "T");
+  add_count(*command, "--particles", options->particles, "particles of the kidney", whole_number(500, 100'000'000));
+  command->add_flag("--full", options->full, "37,704 particles, the default on a device");
+  add_suite(*command, work, "write curves, times and errors as JSON",
             {.run = [options](const auto& progress) { return run_clusters(*options, progress); },
              .row = print_row,
              .end = print_tables});

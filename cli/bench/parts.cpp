@@ -69,8 +69,8 @@ void print_parts(const json& document) {
     rows.push_back(row);
   }
   print();
-  say("Times are of a frame; relative: to the scene as it is. RMS, max: how far, in any frame, tissue is from where it "
-      "is in the scene as it is. Removed otherwise: particles that only one of both has in the end.\n");
+  say("Times are of a frame; relative: to the scene as it is. RMS, max: distance of tissue, in its worst frame, from "
+      "the scene as it is. Removed otherwise: particles that only one of both scenes has at the end.\n");
 }
 
 }  // namespace
@@ -79,14 +79,14 @@ void add_parts(CLI::App& bench, Work& work) {
   const auto options = std::make_shared<benchmarks::PartsOptions>();
   options->stop_asked = stop_asked;
   CLI::App* const command =
-      bench.add_subcommand("parts", "what each part of a scene costs, and what it does without it");
+      bench.add_subcommand("parts", "cost of each part of a scene, and change of the result without it");
   command->add_option("scenes", options->scenes, "files, or names (`cutproof info --scenes`; default: eight of these)")
       ->type_name("SCENE");
   add_backend_name(*command, options->backend, "backend under test", is_timed);
-  add_count(*command, "--frames", options->frames, "of each scene at most", whole_number(1, 10'000));
-  add_count(*command, "--repeats", options->repeats, "timed runs, in turns with those without each part",
+  add_count(*command, "--frames", options->frames, "frames of each scene, at most", whole_number(1, 10'000));
+  add_count(*command, "--repeats", options->repeats, "timed runs, alternating with runs without each part",
             whole_number(1, 1'000));
-  add_suite(*command, work, "write times, errors and stages",
+  add_suite(*command, work, "write times, errors and stages as JSON",
             {.run =
                  [options](const auto& progress) {
                    benchmarks::PartsOptions asked = *options;

@@ -71,13 +71,13 @@ void add_rotations(CLI::App& bench, Work& work) {
   CLI::App* const command =
       bench.add_subcommand("rotations", "methods for the rotation of a cluster, on every hard case");
   add_backend_name(*command, asked->backend, "where", is_timed);
-  add_count(*command, "--matrices", asked->counts.matrices, "of each case", whole_number(1, 10'000'000));
-  add_count(*command, "--timed", asked->timed, "matrices that are timed together (default: 20000; on a device 1000000)",
+  add_count(*command, "--matrices", asked->counts.matrices, "matrices of each case", whole_number(1, 10'000'000));
+  add_count(*command, "--timed", asked->timed, "matrices timed together (default: 20000; on a device 1000000)",
             whole_number(1, 100'000'000));
-  add_count(*command, "--repeats", asked->counts.repeats, "of each timing, after one that does not count",
+  add_count(*command, "--repeats", asked->counts.repeats, "repeats of each timing, after a warm-up",
             whole_number(1, 10'000));
-  add_seed(*command, asked->counts.seed, "added to the seeds of the cases");
-  command->add_flag("--cases", asked->cases, "print the worst gap in every case as well");
+  add_seed(*command, asked->counts.seed, "seed, added to those of the cases");
+  command->add_flag("--cases", asked->cases, "also print the worst gap of every case");
   const auto run = [asked](const benchmarks::Progress& found) {
     std::optional<Progress> progress;
     return run_rotations(*asked, found, [&](int64_t cases_begun, const std::string& what) {
@@ -93,7 +93,7 @@ void add_rotations(CLI::App& bench, Work& work) {
     print_methods(document);
     print_what_is_wrong(document);
   };
-  add_suite(*command, work, "write errors, times and limits",
+  add_suite(*command, work, "write errors, times and limits as JSON",
             {.run = run, .begin = print_begin, .end = print, .rows = "methods"});
 }
 

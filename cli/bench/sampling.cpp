@@ -14,14 +14,14 @@ void print_sampling(const nlohmann::json& document) {
 
 void add_sampling(CLI::App& bench, Work& work) {
   const auto options = std::make_shared<benchmarks::SamplingOptions>();
-  CLI::App* const command = bench.add_subcommand("sampling", "the cut of a kidney at the samplings of Tables 2 and 3");
+  CLI::App* const command = bench.add_subcommand("sampling", "cut of a kidney at the samplings of Tables 2 and 3");
   add_timing(*command, *options);
-  command->add_option("--clusters", options->cooking, "how they are cooked: boxes or sampled")
+  command->add_option("--clusters", options->cooking, "methods of cooking: boxes, sampled")
       ->capture_default_str()
       ->type_name("C")
       ->check(one_of({"boxes", "sampled"}));
-  command->add_flag("--full", options->full, "the paper's counts of particles, as always on a device");
-  add_suite(*command, work, "write times and errors",
+  command->add_flag("--full", options->full, "the paper's particle counts, the default on a device");
+  add_suite(*command, work, "write times and errors as JSON",
             {.run = [options](const auto& progress) { return run_sampling(*options, progress); },
              .row = print_scene,
              .end = print_sampling});

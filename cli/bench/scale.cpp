@@ -11,7 +11,7 @@ void print_scale(const nlohmann::json& document) { print_scenes(document, report
 void add_scale(CLI::App& bench, Work& work) {
   const auto options = std::make_shared<benchmarks::ScaleOptions>();
   CLI::App* const command =
-      bench.add_subcommand("scale", "a frame, its stages and its memory from a thousand particles to ten million");
+      bench.add_subcommand("scale", "times and memory of a frame, from a thousand to ten million particles");
   add_timing(*command, *options);
   command
       ->add_option("--sizes", options->sizes,
@@ -19,7 +19,7 @@ void add_scale(CLI::App& bench, Work& work) {
       ->delimiter(',')
       ->type_name("N,N...")
       ->check(whole_number(1));
-  add_suite(*command, work, "write times and errors",
+  add_suite(*command, work, "write times and errors as JSON",
             {.run = [options](const auto& progress) { return run_scale(*options, progress); },
              .row = print_scene,
              .end = print_scale});

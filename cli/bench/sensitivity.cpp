@@ -21,8 +21,8 @@ void print_row_of_sensitivity(const nlohmann::json& document) {
 
 void print_sensitivity(const nlohmann::json& document) {
   say_as_it_is("\n" + table_of(document.at("rows"), columns_of(report::kSensitivitySuite), 3));
-  say("least rejected: of a bisection, in the best of the moments. its measured, of bound: the greatest of that "
-      "property over the run as it is. rounding: by how much the run as it is differs from the reference's stages.\n");
+  say("least rejected: by bisection, at the most sensitive moment. its measured, of bound: the greatest value of that "
+      "property over the undisturbed run. rounding: difference of the undisturbed run from the reference's stages.\n");
   for (const nlohmann::json& scene : document.at("scenes")) {
     for (const nlohmann::json& verdict : scene.at("failed")) {
       insist_text(io::filled("FAILS as it is: {property}: {witness/text}\n", verdict));
@@ -35,11 +35,12 @@ void print_sensitivity(const nlohmann::json& document) {
 void add_sensitivity(CLI::App& bench, Work& work) {
   const auto options = std::make_shared<benchmarks::SensitivityOptions>();
   options->stop_asked = stop_asked;
-  CLI::App* const command = bench.add_subcommand("sensitivity", "the least disturbance that the judge of runs rejects");
-  add_backend_name(*command, options->backend, "whose runs are disturbed");
-  add_count(*command, "--particles", options->particles, "of each scene", whole_number(100, 3000));
-  add_count(*command, "--moments", options->moments, "of each stage, evenly over the run", whole_number(1, 1000));
-  add_suite(*command, work, "write every row",
+  CLI::App* const command = bench.add_subcommand("sensitivity", "smallest disturbance that the judge of runs rejects");
+  add_backend_name(*command, options->backend, "scenes whose runs are disturbed");
+  add_count(*command, "--particles", options->particles, "particles of each scene", whole_number(100, 3000));
+  add_count(*command, "--moments", options->moments, "moments of each stage, evenly over the run",
+            whole_number(1, 1000));
+  add_suite(*command, work, "write every row as JSON",
             {.run = [options](const auto& progress) { return run_sensitivity(*options, progress); },
              .row = print_row_of_sensitivity,
              .end = print_sensitivity});

@@ -22,23 +22,22 @@ void print_entry(const nlohmann::json& document) {
 
 void add_solver(CLI::App& bench, Work& work) {
   const auto options = std::make_shared<benchmarks::SolverOptions>();
-  CLI::App* const command =
-      bench.add_subcommand("solver", "iterations of the step against its error, plain and accelerated");
+  CLI::App* const command = bench.add_subcommand("solver", "error of the step by iterations, plain and accelerated");
   add_backend_name(*command, options->backend, "backend under test", is_timed);
   add_list(*command, "--stiffness", options->stiffness, "k [1/s²]", "K");
-  add_list(*command, "--substeps", options->substeps, "of the frame of 4 ms");
-  add_list(*command, "--iterations", options->iterations, "of a substep");
+  add_list(*command, "--substeps", options->substeps, "substeps of the frame of 4 ms");
+  add_list(*command, "--iterations", options->iterations, "iterations of a substep");
   command
       ->add_option("--particles", options->particles,
-                   "of a second body; 0: the block alone (default: 2000; on a device 101096)")
+                   "particles of a second body; 0: the block alone (default: 2000; on a device 101096)")
       ->type_name("N")
       ->check(whole_number(0));
-  command->add_option("--tolerance", options->tolerance, "greatest error that is asked for [h]")
+  command->add_option("--tolerance", options->tolerance, "greatest acceptable error [h]")
       ->capture_default_str()
       ->type_name("H")
       ->check(number_above(0));
   add_count(*command, "--samples", options->samples, "timed steps of each row", whole_number(1, 10'000));
-  add_suite(*command, work, "write every row",
+  add_suite(*command, work, "write every row as JSON",
             {.run = [options](const auto& progress) { return run_solver(*options, progress); },
              .row = print_entry,
              .rows = "scenes"});

@@ -104,18 +104,17 @@ void print_table_1(const json& document) {
 
 void add_stages(CLI::App& bench, Work& work) {
   const auto options = std::make_shared<benchmarks::StagesOptions>();
-  CLI::App* const command = bench.add_subcommand(
-      "stages", "whole frames and each stage, a blade cutting: Table 1, or boxes and kidneys of given sizes");
+  CLI::App* const command =
+      bench.add_subcommand("stages", "whole frames and each stage during a cut: Table 1, or bodies of given sizes");
   add_timing(*command, *options);
-  add_list(*command, "--scenes", options->scenes, "of Table 1, and the irregular path of Fig. 13", "S");
-  add_list(*command, "--clusters", options->cooking, "how they are cooked, instead of both; with --sizes, of boxes",
-           "C");
-  command->add_flag("--full", options->full, "the scenes at the paper's size, as always on a device");
-  add_list(*command, "--sizes", options->sizes, "instead of the scenes: bodies with so many particles");
+  add_list(*command, "--scenes", options->scenes, "scenes of Table 1, and the irregular path of Fig. 13", "S");
+  add_list(*command, "--clusters", options->cooking, "methods of cooking (default: both; with --sizes, boxes)", "C");
+  command->add_flag("--full", options->full, "the paper's sizes of the scenes, the default on a device");
+  add_list(*command, "--sizes", options->sizes, "particles of bodies that replace the scenes");
   const auto print_all = [options](const json& document) {
     if (options->sizes.empty()) print_table_1(document);
   };
-  add_suite(*command, work, "write times and errors",
+  add_suite(*command, work, "write times and errors as JSON",
             {.run = [options](const auto& progress) { return run_stages(*options, progress); },
              .begin = print_machine,
              .row = print_last_scene,
