@@ -119,11 +119,12 @@ void add_check(CLI::App& program, Work& work) {
   const auto options = std::make_shared<CheckOptions>();
   CLI::App* const command =
       program.add_subcommand("check", "judge a recording, or a state or run of another simulator");
-  command->add_option("recording", options->recording, "what --record was given, an NPZ or HDF5 file, or a folder")
+  command
+      ->add_option("recording", options->recording, "a recording (name given to --record), NPZ or HDF5 file, or folder")
       ->required()
       ->type_name("RECORDING");
-  add_check_depth(*command, options->depth, "how much is judged");
-  add_json(*command, options->json, "write verdicts and counts");
+  add_check_depth(*command, options->depth, "depth of judging");
+  add_json(*command, options->json, "write verdicts and counts as JSON");
   add_junit(*command, options->junit);
   add_report_option(*command, options->report);
   add_baseline(*command, options->baseline);

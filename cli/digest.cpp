@@ -35,8 +35,9 @@ int print_digests(const std::string& recording) {
 
 void add_digest(CLI::App& program, Work& work) {
   const auto recording = std::make_shared<std::string>();
-  CLI::App* const command = program.add_subcommand("digest", "a number for each snapshot, equal where every bit is");
-  command->add_option("recording", *recording, "what `run --record` has written")->required()->type_name("F");
+  CLI::App* const command =
+      program.add_subcommand("digest", "print a number per snapshot; equal numbers mean equal bits");
+  command->add_option("recording", *recording, "recording of `run --record`")->required()->type_name("F");
   command->callback([recording, &work] { work = [recording] { return print_digests(*recording); }; });
 }
 

@@ -64,7 +64,7 @@ std::string basis_of(const oracles::Property& property) {
 }
 
 void print_properties() {
-  insist("properties: where each comes from, when it is judged, what it rests on\n");
+  insist("properties: source, time of judging, assumptions\n");
   oracles::PropertyLists lists = oracles::properties();
   lists.push_back(&oracles::lone_state_properties());
   for (const oracles::PropertyList* const list : lists) {
@@ -79,7 +79,7 @@ void print_properties() {
 int print_scene_names() {
   const std::vector<std::string> names = scene_names();
   if (names.empty()) {
-    throw InputError("cutproof info", "--scenes", "The scenes that come with the program are not beside it.",
+    throw InputError("cutproof info", "--scenes", "The scenes that come with the program are missing.",
                      "Run the program from its build or its package, or give a scene file.");
   }
   for (const std::string& name : names) insist("{}\n  {}\n", name, io::read_scene(scene_file(name)).description);
@@ -164,23 +164,21 @@ int info(const InfoOptions& options, const CLI::App& program) {
 
 void add_info(CLI::App& program, Work& work) {
   const auto options = std::make_shared<InfoOptions>();
-  CLI::App* const command = program.add_subcommand("info", "backends, devices, properties, version; or a mesh");
+  CLI::App* const command =
+      program.add_subcommand("info", "list backends, devices, properties, version; examine a mesh");
   command->add_flag("--scene", options->scene, "list every field of a scene file");
   command->add_flag("--schema", options->schema, "print the JSON Schema of scene files, for editors");
   command->add_flag("--scenes", options->scenes, "list the scenes that come with the program");
-  CLI::Option* const mesh =
-      command
-          ->add_option("--mesh", options->mesh,
-                       "examine a surface mesh: its defects, size and volume, and what --repair would do; exit status "
-                       "1 if it does not bound a solid")
-          ->type_name("FILE");
+  CLI::Option* const mesh = command
+                                ->add_option("--mesh", options->mesh,
+                                             "examine a surface mesh: defects, size, volume and effect of --repair; "
+                                             "exit status 1 if the mesh bounds no solid")
+                                ->type_name("FILE");
   add_unit(*command, options->unit)->needs(mesh);
-  command->add_option("--json", options->json, "write what was found of the mesh")->type_name("F")->needs(mesh);
-  command->add_flag("--limits", options->limits, "list how much is read of each kind of file");
+  command->add_option("--json", options->json, "write findings on the mesh as JSON")->type_name("F")->needs(mesh);
+  command->add_flag("--limits", options->limits, "list the size limits of each kind of file");
   command->add_flag("--man", options->man, "print the manual page, cutproof(1)");
-  command
-      ->add_option("--completion", options->completion,
-                   "print a script that makes a shell offer words: bash, zsh or fish")
+  command->add_option("--completion", options->completion, "print a completion script for a shell: bash, zsh or fish")
       ->type_name("SHELL")
       ->check(one_of({"bash", "zsh", "fish"}));
   command->callback([options, &program, &work] { work = [options, &program] { return info(*options, program); }; });

@@ -160,7 +160,7 @@ void print_properties(const KernelCampaign& campaign) {
         each.kind, each.size, each.size_before, each.seconds);
   }
   if (campaign.refused > 0) {
-    say("  {}: {} questions, of which nothing is known\n", undecided("refused"), campaign.refused);
+    say("  {}: {} questions, without a verdict\n", undecided("refused"), campaign.refused);
   }
   if (const std::string why = campaign.untested(); !why.empty()) {
     insist("{}: too little was judged: {}\n", failing("FAILS"), why);
@@ -217,7 +217,7 @@ std::string keep(const JudgeOptions& options, Guest& guest, const KernelCampaign
          name_of_question(failure.index, failure.size, failure.simplest.kind),
          shortened(failure.verdict.witness.text, kMostWitnessBytes));
   const std::string& now = failure.of_simplest.witness.text;
-  insist("  simplified to {}{}\n", campaign.operation->size_of(failure.simplest),
+  insist("  shrunk to {}{}\n", campaign.operation->size_of(failure.simplest),
          now == failure.verdict.witness.text ? "" : ": " + shortened(now, kMostWitnessBytes));
   insist_copy("  saved; to see it again:", replay_command(options, file, saved.operation));
   if (campaign.operation->files != nullptr) keep_run(file, guest, *campaign.operation, failure);
@@ -247,7 +247,7 @@ void add_cases(const json& result, const JudgeOptions& options, std::vector<io::
       each.text = fmt::format(
           "{}: {}\n{}to see it again: {}",
           name_of_question(failure.at("index"), failure.value("drawn_size", int64_t{0}), failure.at("kind")),
-          each.message, now == each.message ? "" : "simplified: " + now + "\n", again);
+          each.message, now == each.message ? "" : "shrunk: " + now + "\n", again);
       failures.push_back({operation + ": " + each.name, each.message, again});
     }
   }
@@ -396,7 +396,7 @@ int judge(JudgeOptions options) {
     print_properties(campaign);
     add_cases(result, options, junit, failures);
     if (campaign.ended) {
-      insist("  nothing more was asked: the guest is gone\n");
+      insist("  no further question was asked: the guest has ended\n");
     } else if (campaign.gave_up) {
       insist("  given up after {} questions that were not answered; --keep-going goes on\n", campaign.lost);
     }
@@ -456,49 +456,48 @@ int judge(JudgeOptions options) {
 
 void add_judge(CLI::App& program, Work& work) {
   const auto options = std::make_shared<JudgeOptions>();
-  CLI::App* const command = program.add_subcommand("judge", "your own kernels, from a shared library");
+  CLI::App* const command = program.add_subcommand("judge", "judge your own kernels, from a shared library");
   command->add_option("plugin", options->guest.library, "a shared library that includes cutproof/plugin.h")
       ->type_name("FILE.so");
   command
       ->add_option("operations", options->operations,
-                   "which of its operations: rotations, components, surface, clusters, dissect, stages (default: all)")
+                   "operations of the plugin: rotations, components, surface, clusters, dissect, stages (default: all)")
       ->type_name("OPS");
   add_count(*command, "--cases", options->cases,
             "matrices, bodies or scenes for each operation (default: 100000, 2000 or 200)", whole_number(1));
   command
       ->add_option("--sizes", options->sizes,
-                   "of large questions, as matrices or particles; 0: ask none (default: beside 65536 and more)")
+                   "sizes of large questions in matrices or particles; 0: none (default: about 65536 and more)")
       ->delimiter(',')
       ->allow_extra_args(false)  // what follows are operations
       ->type_name("N,...")
       ->check(whole_number(0, static_cast<int>(guests::kMostSize)));
-  command->add_option("--seconds", options->campaign.seconds, "for how long, for each operation")
+  command->add_option("--seconds", options->campaign.seconds, "time for each operation")
       ->type_name("S")
       ->check(number_from(0));
-  add_seed(*command, options->campaign.seed, "what cases are drawn from");
-  command->add_option("--parameters", options->guest.parameters, "a text for the plugin's create()")->type_name("TEXT");
-  command->add_option("--time-limit", options->guest.time_limit, "for each answer")
+  add_seed(*command, options->campaign.seed, "seed of the cases");
+  command->add_option("--parameters", options->guest.parameters, "text for the plugin's create()")->type_name("TEXT");
+  command->add_option("--time-limit", options->guest.time_limit, "time for each answer")
       ->capture_default_str()
       ->type_name("S")
       ->check(number_between(0.01, 1e6));
-  command->add_flag("--keep-going", options->keep_going, "beyond ten questions that were not answered");
-  command->add_option("--simplify", options->campaign.simplify, "how long each failure is simplified, 0: not at all")
+  command->add_flag("--keep-going", options->keep_going, "go on after ten unanswered questions");
+  command->add_option("--simplify", options->campaign.simplify, "time for shrinking each failure; 0: none")
       ->capture_default_str()
       ->type_name("S")
       ->check(number_from(0));
   command->add_option("--save", options->save, "folder for counterexamples")->capture_default_str()->type_name("DIR");
   command
-      ->add_option(
-          "--attached", options->attached,
-          "instead of FILE.so: a guest that runs already, such as cutproof.py, by the numbers of two open files")
+      ->add_option("--attached", options->attached,
+                   "instead of FILE.so: a running guest, such as cutproof.py, by the numbers of two open files")
       ->delimiter(',')
       ->allow_extra_args(false)  // what follows are operations
       ->type_name("SOCKET,MEMORY")
       ->check(whole_number(0, std::numeric_limits<int>::max()));
-  add_json(*command, options->json, "write counts and failures");
+  add_json(*command, options->json, "write counts and failures as JSON");
   add_junit(*command, options->junit);
   add_report_option(*command, options->report);
-  command->add_option("--case", options->replay, "one saved question again, and nothing else")->type_name("CASE");
+  command->add_option("--case", options->replay, "ask only this saved question")->type_name("CASE");
   command->callback([options, command, &work] {
     options->again = as_given(*command);
     work = [options] { return judge(*options); };

@@ -41,11 +41,11 @@ int status_of_exception() noexcept {
   } catch (const cutproof::guests::CannotRunHere& error) {
     return say((std::string("skipped: ") + error.what()).c_str(), 77);
   } catch (const std::bad_alloc&) {
-    return say("the machine has not enough memory for this", 3);
+    return say("the machine does not have enough memory for this", 3);
   } catch (const std::exception& error) {
     return say(error.what(), 3);
   } catch (...) {
-    return say("something that is no exception was thrown: a defect of this program", 3);
+    return say("an unknown exception was thrown: a defect of this program", 3);
   }
 }
 
@@ -61,9 +61,9 @@ int status_of_exception() noexcept {
 int run_command_line(int argc, char** argv) {
   using namespace cutproof::cli;
   CLI::App app{
-      "cutproof: judges soft-body dissection. Cuts a body made of shape matching clusters and certifies every frame.\n"
-      "Exit status: 0 everything holds, 1 a verdict failed or nothing was judged, 2 bad input or usage, 3 the machine "
-      "failed, 77 a plugin cannot run here."};
+      "cutproof judges soft-body dissection: it cuts a body made of shape matching clusters and certifies every "
+      "frame.\nExit status: 0 everything holds, 1 a verdict failed or nothing was judged, 2 bad input or usage, 3 the "
+      "machine failed, 77 a plugin cannot run here."};
   app.set_version_flag("--version", std::string("cutproof ") + kVersion);
   app.require_subcommand(1);
   Work work;

@@ -77,7 +77,7 @@ void print_usual_counts(double volume) {
 CLI::Option* add_unit(CLI::App& command, std::string& unit) {
   std::vector<std::string> names;
   for (const fixtures::MeshUnit& each : fixtures::kMeshUnits) names.emplace_back(each.name);
-  return command.add_option("--unit", unit, "what one unit of the mesh is: mm, cm or m")
+  return command.add_option("--unit", unit, "unit of the mesh's numbers: mm, cm or m")
       ->capture_default_str()
       ->type_name("U")
       ->check(one_of(names));
@@ -120,14 +120,14 @@ void print_examination(const MeshExamination& mesh, const std::string& unit) {
   insist("it does {} bound a solid:\n", failing("not"));
   print_defects(mesh.defects);
   if (!mesh.repaired_defects.empty()) {
-    insist("--repair would not help; what it leaves:\n");
+    insist("--repair would not help; remaining defects:\n");
     print_defects(mesh.repaired_defects);
   } else {
-    insist("--repair would make it one:\n");
+    insist("--repair would make it a solid:\n");
   }
   for (const std::string& line : fixtures::report_lines(*mesh.repair)) say("  {}\n", line);
   if (mesh.repaired_defects.empty() && fixtures::volume_at_stake(*mesh.repair) > kMostRepairChange) {
-    insist("a run refuses that unless --repair-change allows it: {}\n",
+    insist("a run refuses this repair unless --repair-change allows it: {}\n",
            fixtures::stake_in_words(*mesh.repair, kMostRepairChange));
   }
   if (mesh.repaired_defects.empty()) {

@@ -44,11 +44,11 @@ void add_backend(CLI::App& command, harness::BackendChoice& choice, const std::s
       ->capture_default_str()
       ->type_name("S")
       ->check(one_of(harness::schedule_names()));
-  add_seed(command, choice.seed, scheduled + ": what random and pct are drawn from", "--schedule-seed");
+  add_seed(command, choice.seed, scheduled + ": seed of random and pct", "--schedule-seed");
 }
 
 void add_devices(CLI::App& command, std::string& devices) {
-  command.add_option("--devices", devices, "of the backend: numbers, or all that this host has (default: 0)")
+  command.add_option("--devices", devices, "devices of the backend: numbers, or all of this host (default: 0)")
       ->type_name("N,N...|all");
 }
 
@@ -68,7 +68,7 @@ CLI::Option* add_check_depth(CLI::App& command, std::string& asked, const std::s
 harness::Depth depth_asked(const std::string& asked) {
   const std::optional<harness::Depth> depth = harness::depth_named(asked);
   if (!depth) {
-    refuse("--check", fmt::format("'{}' is no depth of judging", asked),
+    refuse("--check", fmt::format("'{}' is not a depth of judging", asked),
            did_you_mean(asked, harness::kDepthNames) + fmt::format("use {}", fmt::join(harness::kDepthNames, " or ")));
   }
   return *depth;

@@ -43,7 +43,7 @@ int replay(const ReplayOptions& options) {
   const Case& c = counterexample.failing;
   const bool is_history = !counterexample.commands.empty();
   if (is_history && !options.record.empty()) {
-    refuse("--record", file + " is a history of commands, which no recording holds", "leave it out");
+    refuse("--record", file + " is a history of commands, which cannot be recorded", "leave it out");
   }
   say("{}: {}, {}, {}backend {}\n", file, counted(c.nodes.size(), "particle", "particles"),
       counted(c.strokes.size(), "stroke", "strokes"),
@@ -82,11 +82,11 @@ void add_replay(CLI::App& program, Work& work) {
   const auto options = std::make_shared<ReplayOptions>();
   options->backend.name.clear();
   CLI::App* const command = program.add_subcommand("replay", "run a counterexample again");
-  command->add_option("counterexample", options->counterexample, "what `cutproof fuzz` has saved")
+  command->add_option("counterexample", options->counterexample, "file that `cutproof fuzz` saved")
       ->required()
       ->type_name("CASE");
-  add_backend(*command, options->backend, "backend under test (default: where it was found)");
-  command->add_option("--record", options->record, "keep every frame, for `cutproof check` and ParaView")
+  add_backend(*command, options->backend, "backend under test (default: the one that failed)");
+  command->add_option("--record", options->record, "record every frame, for `cutproof check` and ParaView")
       ->type_name("F");
   command->callback([options, command, &work] {
     options->again = as_given(*command);

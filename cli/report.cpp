@@ -242,19 +242,17 @@ int make_report(const ReportOptions& options) {
 void add_report(CLI::App& program, Work& work) {
   const auto options = std::make_shared<ReportOptions>();
   CLI::App* const command =
-      program.add_subcommand("report", "make a page of a recording, or of what --json has written");
+      program.add_subcommand("report", "write a page about recordings, results or counterexamples");
   if (!report::has_pages()) command->group("");
   command
-      ->add_option(
-          "files", options->files,
-          "a recording, and what `run --json` or `check --json` has written of it (without, nothing on the page "
-          "is judged), or another recording of the same scene, to stand beside it; or what `fuzz`, `judge`, `bench` or "
-          "`tune` has written with --json; or counterexamples")
+      ->add_option("files", options->files,
+                   "a recording, alone, with its `run --json` or `check --json` result, or with another recording of "
+                   "the same scene; or --json results of `fuzz`, `judge`, `bench` or `tune`; or counterexamples")
       ->required()
       ->type_name("FILE...");
   command->add_option("-o,--output", options->output, "the page to write")->required()->type_name("F");
   add_backend_name(*command, options->backend,
-                   "on which counterexamples are run again (default: where they were found, but no plugin)");
+                   "backend that runs counterexamples again (default: the one that failed; plugins only by name)");
   command->callback([options, command, &work] {
     options->again = as_given(*command);
     work = [options] { return make_report(*options); };

@@ -15,7 +15,7 @@
 namespace cutproof::cli {
 
 void add_report_option(CLI::App& command, std::string& path) {
-  command.add_option("--report", path, "write a page for a browser: what happened, what holds, what fails and where")
+  command.add_option("--report", path, "write a page for a browser: events, verdicts, and places of failures")
       ->type_name("F");
 }
 

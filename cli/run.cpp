@@ -85,7 +85,7 @@ using harness::RunSession;
 AgainstMode against_mode(const RunOptions& options) {
   const harness::BackendDescriptor* const other = harness::find_backend(options.against);
   if (other == nullptr || !other->is_the_reference) {
-    refuse("--against", fmt::format("'{}' is nothing to compare with", options.against),
+    refuse("--against", fmt::format("there is no comparison with '{}'", options.against),
            fmt::format("use --against {}", harness::reference_backend().name));
   }
   return options.mode == "lockstep"       ? AgainstMode::lockstep
@@ -421,31 +421,30 @@ int run(const RunOptions& options) {
 
 void add_run(CLI::App& program, Work& work) {
   const auto options = std::make_shared<RunOptions>();
-  CLI::App* const command = program.add_subcommand("run", "simulate a scene, and judge it with --check");
+  CLI::App* const command = program.add_subcommand("run", "simulate a scene; with --check, judge every frame");
   add_scene(*command, options->scene);
   add_backend(*command, options->backend, "backend under test");
-  command->add_option("--mesh", options->mesh, "closed surface mesh that takes the place of the scene's body")
-      ->type_name("FILE");
+  command->add_option("--mesh", options->mesh, "closed surface mesh that replaces the scene's body")->type_name("FILE");
   add_unit(*command, options->unit)->needs("--mesh");
-  command->add_flag("--repair", options->repair, "repair the mesh if it does not bound a solid, and say what was done")
+  command->add_flag("--repair", options->repair, "repair the mesh if it bounds no solid, and report the changes")
       ->needs("--mesh");
   command
       ->add_option("--repair-change", options->repair_change,
-                   "most that --repair may change the volume by, as a share of it; 1: by anything")
+                   "greatest change of volume by --repair, as a share; 1: any change")
       ->capture_default_str()
       ->type_name("X")
       ->check(number_between(0, 1))
       ->needs("--repair");
   add_count(*command, "--frames", options->frames,
-            "stop after this many frames of the scene, and judge what is in reach", whole_number(0));
-  add_check_depth(*command, options->check, "judge every frame by every property, and by what the scene expects")
+            "stop after this many frames; expectations beyond them are not judged", whole_number(0));
+  add_check_depth(*command, options->check, "judge every frame by every property and by the scene's expectations")
       ->expected(0, 1);
   command
       ->add_option("--against", options->against,
                    fmt::format("compare every stage with this backend: {}", harness::reference_backend().name))
       ->type_name("B")
       ->check(usually_one_of({std::string(harness::reference_backend().name)}));
-  command->add_option("--mode", options->mode, "of the comparison: lockstep, free-running or both")
+  command->add_option("--mode", options->mode, "mode of the comparison: lockstep, free-running or both")
       ->capture_default_str()
       ->type_name("M")
       ->check(one_of({"lockstep", "free-running", "both"}))
@@ -457,16 +456,16 @@ void add_run(CLI::App& program, Work& work) {
       ->type_name("E,E...")
       ->check(usually_one_of(error_names()));
   add_count(*command, "--error-frames", options->error_frames,
-            "look at solver error and interpenetration in so many frames, evenly over the run", whole_number(1))
+            "frames for solver error and interpenetration, evenly over the run", whole_number(1))
       ->needs("--errors");
-  command->add_option("--record", options->record, "keep every frame, for `cutproof check` and ParaView")
+  command->add_option("--record", options->record, "record every frame, for `cutproof check` and ParaView")
       ->type_name("F");
-  add_json(*command, options->json, "write verdicts, stage times and counts");
+  add_json(*command, options->json, "write verdicts, stage times and counts as JSON");
   add_junit(*command, options->junit);
   add_report_option(*command, options->report);
   command
       ->add_option("--preview", options->preview,
-                   "write a page for a browser that shows the body and the way of the blade; nothing runs")
+                   "only write a page for a browser that shows the body and the blade's path")
       ->type_name("F");
   add_baseline(*command, options->baseline);
   command->callback([options, command, &work] {

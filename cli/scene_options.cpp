@@ -16,14 +16,14 @@ CLI::Option* add_scene(CLI::App& command, SceneOptions& options) {
                       "scene file (JSON, see `cutproof info --scene`), or a name (`cutproof info --scenes`)")
           ->type_name("SCENE")
           ->check(usually_one_of(scene_names()));
-  command.add_option("--set", options.set, "another value of a field, such as step.iterations=8; repeatable")
+  command.add_option("--set", options.set, "change a field of the scene, such as step.iterations=8; repeatable")
       ->allow_extra_args(false)
       ->type_name("FIELD=V");
-  add_count(command, "--particles", options.particles, "how many particles the body is to have", whole_number(1));
-  command.add_option("--spacing", options.spacing, "distance of particles [m], instead of a number of them")
+  add_count(command, "--particles", options.particles, "number of particles of the body", whole_number(1));
+  command.add_option("--spacing", options.spacing, "distance of particles [m], instead of --particles")
       ->type_name("H")
       ->check(number_above(0));
-  command.add_option("--seed", options.seed, "of everything random, instead of the scene's")
+  command.add_option("--seed", options.seed, "seed of all random numbers, instead of the scene's")
       ->type_name("N")
       ->check(seed_number());
   return scene;
@@ -34,7 +34,7 @@ std::vector<io::SceneChange> changes_of(const SceneOptions& options) {
   for (const std::string& given : options.set) {
     const std::size_t equals = given.find('=');
     if (equals == std::string::npos || equals == 0) {
-      refuse("--set", fmt::format("'{}' is no field with a value", given),
+      refuse("--set", fmt::format("'{}' is not a field with a value", given),
              "give both, such as --set step.iterations=8; `cutproof info --scene` lists the fields");
     }
     changes.push_back({"--set " + given, given.substr(0, equals), given.substr(equals + 1)});

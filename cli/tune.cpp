@@ -302,29 +302,29 @@ void add_tune(CLI::App& program, Work& work) {
   add_scene(*command, asked->scene)->required();
   command
       ->add_option("--tolerance", options.tolerance,
-                   "greatest RMS distance from the reference solution in any frame [h]")
+                   "greatest acceptable RMS distance from the reference solution in any frame [h]")
       ->required()
       ->type_name("T")
       ->check(number_above(0));
   command
       ->add_option("--reference", asked->reference,
-                   "the reference solution. limit: of ever shorter time steps; substeps: the scene's own, each solved "
-                   "until it is converged")
+                   "reference solution. limit: shorter and shorter time steps; substeps: the scene's own, each solved "
+                   "to convergence")
       ->capture_default_str()
       ->type_name("R")
       ->check(one_of({"limit", "substeps"}));
   add_backend(*command, options.backend, "backend under test", is_timed);
-  add_count(*command, "--frames", options.frames, "look at this many frames of the scene only", whole_number(1));
-  command->add_flag("--without-skin", options.without_skin, "nobody looks at the skin: it need not be made");
+  add_count(*command, "--frames", options.frames, "only this many frames of the scene", whole_number(1));
+  command->add_flag("--without-skin", options.without_skin, "make no skin");
   command->add_flag("--full", options.full,
-                    "run and time everything to its end, for a curve; else what is beyond the tolerance, or more "
-                    "expensive than what was found, is given up");
+                    "run and time all configurations to the end, for a curve; otherwise those beyond the tolerance, or "
+                    "dearer than the best, are given up");
   add_count(*command, "--repeats", options.repeats,
-            "timed runs of each configuration; with --full one of those that are clearly not on the front",
+            "timed runs of each configuration; with --full only one if clearly not on the front",
             whole_number(1, 1000));
-  command->add_option("--write", options.write, "the scene that was found (default: NAME_tuned.json here)")
+  command->add_option("--write", options.write, "file for the scene found (default: NAME_tuned.json here)")
       ->type_name("F");
-  add_json(*command, asked->json, "write everything that was tried");
+  add_json(*command, asked->json, "write all tried configurations as JSON");
   add_report_option(*command, asked->report);
   command->callback([asked, command, &work] {
     asked->again = as_given(*command);

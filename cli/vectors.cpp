@@ -170,18 +170,18 @@ int check_vectors(const CheckVectorsOptions& options) {
 void add_vectors(CLI::App& program, Work& work) {
   const auto options = std::make_shared<VectorsOptions>();
   CLI::App* const command =
-      program.add_subcommand("vectors", "test vectors for single kernels, as a file for any program");
+      program.add_subcommand("vectors", "write test vectors of one kernel, a file for any program");
   command->add_option("operation", options->operation, operation_names())
       ->required()
       ->type_name("OP")
       ->check(usually_one_of(listed(operation_names())));
-  command->add_option("-o,--output", options->file, "NPZ if its name ends in .npz, else HDF5")
+  command->add_option("-o,--output", options->file, "file to write: NPZ if the name ends in .npz, else HDF5")
       ->required()
       ->type_name("FILE");
   add_count(*command, "--cases", options->cases,
-            "at least one of each kind (default: 200; of rotations, one of each kind)", whole_number(1));
-  add_seed(*command, options->seed, "what cases are drawn from");
-  command->add_option("--precision", options->precision, "of the numbers, and of the bounds")
+            "number of cases, at least one of each kind (default: 200; rotations: one of each kind)", whole_number(1));
+  add_seed(*command, options->seed, "seed of the cases");
+  command->add_option("--precision", options->precision, "precision of the numbers and of the bounds: single or double")
       ->capture_default_str()
       ->check(one_of({"single", "double"}));
   command->callback([options, &work] { work = [options] { return make_vectors(*options); }; });
@@ -189,17 +189,14 @@ void add_vectors(CLI::App& program, Work& work) {
 
 void add_check_vectors(CLI::App& program, Work& work) {
   const auto options = std::make_shared<CheckVectorsOptions>();
-  CLI::App* const command = program.add_subcommand("check-vectors", "judge what your code made of test vectors");
-  command->add_option("vectors", options->vectors, "what `cutproof vectors` has written")
-      ->required()
-      ->type_name("FILE");
-  command->add_option("answers", options->answers, "NPZ or HDF5: the answers to all its cases")
+  CLI::App* const command = program.add_subcommand("check-vectors", "judge your code's answers to test vectors");
+  command->add_option("vectors", options->vectors, "file from `cutproof vectors`")->required()->type_name("FILE");
+  command->add_option("answers", options->answers, "answers to all cases of the file, as NPZ or HDF5")
       ->required()
       ->type_name("ANSWERS");
-  command
-      ->add_option("--promises", options->promises, "what is judged, in words (default: what the operation promises)")
+  command->add_option("--promises", options->promises, "promises to judge, by name (default: all of the operation)")
       ->type_name("WORDS");
-  add_json(*command, options->json, "write counts and failures");
+  add_json(*command, options->json, "write counts and failures as JSON");
   add_junit(*command, options->junit);
   command->callback([options, command, &work] {
     options->again = as_given(*command);

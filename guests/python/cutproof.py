@@ -873,7 +873,7 @@ def _describe(guest, document, seed, precision):
                 else f"question {failure['index']}"
             lines += [f"{name}: '{failure['property']}' fails in {question} ({failure['kind']})",
                       f"  {failure['text']}"]
-            lines += [f"  simplified to {failure['size']}: {failure['simplified']}",
+            lines += [f"  shrunk to {failure['size']}: {failure['simplified']}",
                       f"  measured {measured}{unit}, the bound is {bound}{unit}",
                       f"  saved; to see it again: "
                       f"cutproof.replay({failure['file']!r}, {name}={function}{more})"]
@@ -886,7 +886,7 @@ def _describe(guest, document, seed, precision):
         if operation["ended"]:
             why = "a function that has not ended cannot be asked again" if guest.interrupted else \
                 "after this nothing can be asked in this process"
-            lines.append(f"{name}: nothing more was asked: {why}")
+            lines.append(f"{name}: no further question was asked: {why}")
         elif operation["gave_up"]:
             lines.append(f"{name}: given up after {operation['not_answered']} questions that were not answered; "
                          "keep_going=True goes on")

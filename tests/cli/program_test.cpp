@@ -174,7 +174,7 @@ TEST_F(Program, ExaminesAMeshWithoutAScene) {
   EXPECT_TRUE(json::parse(read("sound.json")).at("solid"));
   const Outcome open = cutproof("info --mesh open.off --unit cm --json open.json");
   EXPECT_EQ(open.status, 1) << open.output;
-  for (const char* word : {"600 × 500 × 500 mm", "the surface is open: 3 edges", "--repair would make it one",
+  for (const char* word : {"600 × 500 × 500 mm", "the surface is open: 3 edges", "--repair would make it a solid",
                            "1 hole filled with 1 triangle", "volume 1.5e+05 cm³"}) {
     EXPECT_NE(open.output.find(word), std::string::npos) << word << " in " << open.output;
   }

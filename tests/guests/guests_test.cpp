@@ -1323,7 +1323,7 @@ TEST_F(JudgeVerb, SavesWhatFailsAndShowsItAgainWithoutThePluginsSource) {
   const Ran wrong = run(fmt::format("judge {} components --parameters label --cases 100 --save {} --json {} --junit {}",
                                     PLUGIN_in_c, folder_, document, junit));
   EXPECT_EQ(wrong.status, 1);
-  EXPECT_TRUE(contains(wrong.output, "simplified to 2 particles: an edge joins")) << wrong.output;
+  EXPECT_TRUE(contains(wrong.output, "shrunk to 2 particles: an edge joins")) << wrong.output;
   const json result = json::parse(text_of(document));
   EXPECT_FALSE(result.at("holds").get<bool>());
   const json& failure = result.at("operations").at(0).at("failures").at(0);
@@ -1349,7 +1349,7 @@ TEST_F(JudgeVerb, FindsFaultsOfWidthByDefaultAndSavesTheirSize) {
                                     PLUGIN_in_c, folder_, document));
   EXPECT_EQ(wrong.status, 1);
   EXPECT_TRUE(contains(wrong.output, "the question of size 65537 (many vertices")) << wrong.output;
-  EXPECT_TRUE(contains(wrong.output, "simplified to 65537 particles")) << wrong.output;
+  EXPECT_TRUE(contains(wrong.output, "shrunk to 65537 particles")) << wrong.output;
   const json failure = json::parse(text_of(document)).at("operations").at(0).at("failures").at(0);
   const std::string file = failure.at("file");
   EXPECT_LT(fs::file_size(file), 1000u);

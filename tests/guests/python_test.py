@@ -162,7 +162,7 @@ class Operations(Test):
         self.assertIn("a reflection", failures["rotation"]["text"])
         self.assertEqual(failures["rotation"]["size"], "1 matrix")
         self.assertEqual(failures["rotation"]["measured"], 2)
-        for wanted in ("'rotation' fails in question", "simplified to 1 matrix", "measured 2, the bound is 5e-06",
+        for wanted in ("'rotation' fails in question", "shrunk to 1 matrix", "measured 2, the bound is 5e-06",
                        f"cutproof.replay('{failures['rotation']['file']}', rotations=reflections)"):
             self.assertIn(wanted, text)
         with self.assertRaises(cutproof.Failed) as again:
@@ -512,7 +512,7 @@ class Program(Test):
         self.assertLess(time.monotonic() - begin, 20)
         self.assertEqual(failures["answers"]["text"], "it did not answer within 0.5 s")
         self.assertIn("time.sleep(0.01)", text)
-        self.assertIn("nothing more was asked", text)
+        self.assertIn("no further question was asked", text)
         self.judge(components=labels_by_union_find)  # and nothing is left of it
 
     def test_it_can_be_asked_within_a_function_and_in_another_thread(self):

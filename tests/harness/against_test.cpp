@@ -42,7 +42,7 @@ TEST_F(TheProgram, ComparesInOneModeOnlyIfAsked) {
 TEST_F(TheProgram, RefusesToCompareWithAnythingElse) {
   const Outcome outcome = cutproof("run " + kScene + " --against host");
   EXPECT_EQ(outcome.status, 2);
-  EXPECT_NE(outcome.output.find("'host' is nothing to compare with"), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find("there is no comparison with 'host'"), std::string::npos) << outcome.output;
   EXPECT_EQ(cutproof("run " + kScene + " --against reference --mode loose").status, 2);
   EXPECT_EQ(cutproof("run " + kScene + " --mode lockstep").status, 2);
 }
