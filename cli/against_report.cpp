@@ -102,9 +102,9 @@ void print_lockstep(const harness::Lockstep& lockstep) {
     if (rotations) row(oracles::kMeasures[m].name, angle, "rad");
     row(rotations ? "" : oracles::kMeasures[m].name, lockstep.worst(measure).norm, oracles::kMeasures[m].unit);
   }
-  say("undecidable within rounding:\n");
+  say("inconclusive within rounding:\n");
   say("{:>8} removals within the rounding band\n", undecidable.removals);
-  say("{:>8} decisions of steps that the reference takes otherwise\n", undecidable.otherwise);
+  say("{:>8} decisions of steps that differ from the reference's\n", undecidable.otherwise);
   say("{:>8} positions that rounding carries beyond the bound: not measured, but judged\n", undecidable.positions);
   say("{:>8} rotations, the same\n", undecidable.rotations);
   say("{:>8} positions that rounding carries so far that they are not judged sharply\n", undecidable.undecided);

@@ -159,7 +159,7 @@ std::vector<JunitCase> cases_of(const harness::SceneJudge& judge, const Judging&
   for (const harness::Judge::Unpromised& one : judge.unpromised()) {
     cases.push_back({fmt::format("{}, where it is not promised", one.property), judging.class_name, 0,
                      JunitOutcome::skipped,
-                     fmt::format("not promised: of {} states it would not hold in {}", one.states, one.failing)});
+                     fmt::format("not promised: of {} states it would fail in {}", one.states, one.failing)});
   }
   const auto skip_expected = [&](const std::vector<std::string>& expected, const char* why) {
     for (const std::string& one : expected) {

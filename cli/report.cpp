@@ -187,7 +187,7 @@ int report_recordings(const ReportOptions& options, const std::vector<std::strin
   write_page(options.output, reader, results, "cutproof check " + quoted(files.front()), made_by(options.again),
              beside ? &*beside : nullptr);
   print_written(options.output);
-  insist("{}\n", !results.checked ? "nothing on the page is judged: give results for that"
+  insist("{}\n", !results.checked ? "nothing on the page is judged: give results as well"
                  : results.holds  ? "everything on the page holds"
                                   : "NOT everything on the page holds");
   return 0;

@@ -94,7 +94,7 @@ std::string usage_error(const CLI::App& program, const CLI::ParseError& error, c
     std::vector<std::string> verbs;
     for (const CLI::App* const verb : shown_commands(program)) verbs.push_back(verb->get_name());
     if (!words.front().starts_with('-')) {
-      return sentence(words.front(), "there is no such verb",
+      return sentence(words.front(), "there is no such subcommand",
                       did_you_mean(words.front(), verbs) + fmt::format("use one of {}", fmt::join(verbs, ", ")));
     }
   }

@@ -78,7 +78,7 @@ constexpr int64_t kParticlesOnADevice = 50'000;
 constexpr std::array kBackends = {
     BackendDescriptor{
         .name = kReferenceName,
-        .summary = "CPU, double precision, serial: the oracle that everything else is compared with",
+        .summary = "CPU, double precision, serial: the reference of all comparisons",
         .precision = Precision::binary64,
         .is_the_reference = true,
         .runs_kernels = false,
@@ -88,14 +88,14 @@ constexpr std::array kBackends = {
     },
     BackendDescriptor{
         .name = kHostName,
-        .summary = "the CUDA kernels' source, single precision, on the threads of this CPU",
+        .summary = "the CUDA kernels, compiled for the threads of this CPU, single precision",
         .processor = Processor::all_threads,
         .bodies_in_a_load = kBodiesOnTheHost,
         .make = make_host<>,
     },
     BackendDescriptor{
         .name = "host-blocks",
-        .summary = "the same in blocks of 32 threads: slower, and it tells where kernels break the rules of a block",
+        .summary = "as host, in blocks of 32 threads: slower; finds violations of the rules of a block",
         .processor = Processor::all_threads,
         .is_timed = false,
         .is_another_path = true,
@@ -104,7 +104,7 @@ constexpr std::array kBackends = {
     },
     BackendDescriptor{
         .name = "simulated",
-        .summary = "the same on one thread, under a schedule that is chosen and can be replayed",
+        .summary = "as host, on one thread, under a chosen schedule that can be replayed",
         .is_timed = false,
         .takes_schedule = true,
         .make = [](const BackendChoice& choice) { return make_simulated(generator(choice)); },
@@ -123,7 +123,7 @@ constexpr std::array kBackends = {
     },
     BackendDescriptor{
         .name = "gpu-eager",
-        .summary = "the same, kernel by kernel",
+        .summary = "as gpu, kernel by kernel",
         .processor = Processor::device,
         .is_timed = false,
         .is_another_path = true,
@@ -158,7 +158,7 @@ int device_count([[maybe_unused]] std::string& why) {
 #endif
 }
 
-constexpr const char* kToolkitWanted = "no CUDA toolkit of version 12.4 or newer was there";
+constexpr const char* kToolkitWanted = "no CUDA toolkit of version 12.4 or newer was found";
 
 void require_built(const BackendDescriptor& backend) {
   if (backend.is_built()) return;
@@ -263,7 +263,7 @@ std::vector<int> devices_of(const std::string& text, const BackendDescriptor& ba
     const std::string number = text.substr(begin, end - begin);
     begin = end + 1;
     if (number.empty() || number.size() > 4 || number.find_first_not_of("0123456789") != std::string::npos) {
-      refuse("--devices", fmt::format("'{}' is no list of devices", text), remedy);
+      refuse("--devices", fmt::format("'{}' is not a list of devices", text), remedy);
     }
     const int device = std::stoi(number);
     if (device >= count) refuse("--devices", fmt::format("there is no device {}", device), remedy);

@@ -62,7 +62,7 @@ bool centers_hang_in_the_air(const ForeignState& foreign) {
 }
 
 std::string why_not(const ForeignState& foreign, const oracles::Property& property) {
-  if (property.check_state == nullptr) return "one state does not show what a stage does";
+  if (property.check_state == nullptr) return "one state does not show the effect of a stage";
   if (property.name == "no pass") return "a file of arrays has no blade";
   if (!foreign.promises.cover(property.name)) return "not promised";
   // Rotations are taken before the positions that follow from them, so this goes without saying of nobody.
@@ -218,7 +218,7 @@ void look_at_pieces(const ForeignState& foreign, ForeignVerdicts& found) {
   found.coincident = coincident.particles;
   if (coincident.particles > 0) {
     found.notes.push_back(fmt::format(
-        "{} where another one is, first particle {} where particle {} is. Is this a seam that was not welded?",
+        "{} where another one is, first particle {} where particle {} is. Is this an unwelded seam?",
         counted(coincident.particles, "particle is", "particles are"), coincident.second, coincident.first));
   }
 }
@@ -247,9 +247,9 @@ void explain_weights(const ForeignState& foreign, Verdict& verdict) {
     if (!foreign.given.contains("rest_centers")) other.clusters.rest_center[at(c)] = sum / mass;
   }
   const bool explains = oracles::rest_frames(setup, other).holds;
-  const char* const shared = "mass / number of clusters that hold the particle";
+  const char* const shared = "mass / number of containing clusters";
   verdict.witness.text +=
-      fmt::format("; the weights that were asked are {}", foreign.plain_weights ? "plain masses" : shared);
+      fmt::format("; the requested weights are {}", foreign.plain_weights ? "plain masses" : shared);
   if (explains) {
     verdict.witness.text += foreign.plain_weights
                                 ? fmt::format(", and with {} all is right: write the text weights = 'shared'", shared)
@@ -269,7 +269,7 @@ bool anything_was_judged(const std::vector<Verdict>& verdicts) {
 
 void note_what_matters(const ForeignState& foreign, ForeignVerdicts& found) {
   if (!foreign.promises_given) {
-    found.notes.push_back("The file has no promises: all that its arrays allow was judged.");
+    found.notes.push_back("The file has no promises: every property was judged that its arrays allow.");
   }
   if (foreign.state.precision == Precision::binary32 && foreign.defect.empty()) {
     found.notes.push_back(
@@ -360,7 +360,7 @@ ForeignVerdicts judge_foreign_state(const ForeignState& foreign) {
   judged.holds = anything_was_judged(found.verdicts);
   judged.measured = judged.holds ? 0 : 1;
   if (!judged.holds) {
-    judged.witness.text = "there was nothing to judge: no particles, or nothing of what is promised is in the file";
+    judged.witness.text = "there was nothing to judge: no particles, or no array of any promised property";
   }
   if (well_formed) found.verdicts.push_back(std::move(judged));
   for (Verdict& verdict : found.verdicts) {

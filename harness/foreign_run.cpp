@@ -45,7 +45,7 @@ JudgedRun judge_run(io::RunSegments segments,
   judged.verdicts = judge->verdicts();
   for (const auto& [property, why] : judge->not_asked()) judged.not_judged.push_back({property, why});
   if (frames.header().promised(RunPromise::deterministic))
-    judged.not_judged.push_back({"determinism", "one run does not show what another one does"});
+    judged.not_judged.push_back({"determinism", "one run shows no relation to another one"});
   skin.finish(frames.header().promised(RunPromise::skin), judged);
   judged.pieces = judge->pieces();
   for (const std::string& note : judge->notes()) judged.notes.push_back(note);

@@ -35,7 +35,7 @@ class Reader {
       out_.plain_weights = *weights == "plain";
       if (*weights != "plain" && *weights != "shared") {
         in_.refuse("weights", fmt::format("This is '{}'.", *weights),
-                   "Write 'shared' (mass / number of clusters that hold the particle) or 'plain' (mass).");
+                   "Write 'shared' (mass / number of containing clusters) or 'plain' (mass).");
       }
     }
   }
@@ -96,8 +96,7 @@ class Reader {
     out_.notes = in_.notes();
     if (widened_.empty()) return;
     out_.notes.push_back(
-        fmt::format("Each number of {} is one of single precision, stored as float64: the state is "
-                    "judged as single precision.",
+        fmt::format("All numbers of {} are float32 values stored as float64: the state is judged as single precision.",
                     fmt::join(widened_, ", ")));
   }
 
@@ -115,7 +114,7 @@ class Reader {
     }
     in_.both("tau", "cap");
     if ((out_.pieces = in_.whole_number("pieces")) && *out_.pieces < 0) {
-      in_.refuse("pieces", fmt::format("This is {}.", *out_.pieces), "Give how many pieces the tissue is in.");
+      in_.refuse("pieces", fmt::format("This is {}.", *out_.pieces), "Give the number of pieces of tissue.");
     }
     if (const auto alpha = in_.number("alpha")) {
       if (!(*alpha > 0 && *alpha < 1)) {
@@ -228,7 +227,7 @@ class Reader {
       if (std::isfinite(length)) longest = std::max(longest, length);
     }
     if (!(longest > 0) && out_.defect.empty()) {
-      in_.refuse("spacing", "No edge has a length from which it follows.", "Give the spacing: the length of an edge.");
+      in_.refuse("spacing", "No edge has a positive length.", "Give the spacing: the length of an edge.");
     }
     return longest > 0 ? longest : 1;
   }
@@ -471,39 +470,39 @@ class Reader {
 
 const std::vector<KnownArray>& foreign_state_arrays() {
   static const std::vector<KnownArray> known = {
-      {"positions", "where particles are [m]"},
+      {"positions", "positions of particles [m]"},
       {"alive", "1: in the tissue, 0: gone"},
-      {"cluster_offsets", "where each cluster's members begin and the last one's end"},
+      {"cluster_offsets", "where the members of each cluster begin, and the end of the last"},
       {"cluster_members", "particles, cluster by cluster"},
       {"edges", "pairs of particles that are joined"},
       {"edge_offsets", "where each particle's edges begin"},
-      {"edge_ends", "their other ends"},
-      {"nodes", "where particles are on a regular grid"},
+      {"edge_ends", "other ends of edges"},
+      {"nodes", "integer coordinates of particles on a regular grid"},
       {"spacing", "h: distance of neighbouring nodes, or length of an edge [m]"},
-      {"rest", "where particles are at rest [m]"},
-      {"mass", "of particles [kg]"},
-      {"removed", "particles that a cut has taken out, ever"},
-      {"velocities", "of particles [m/s]"},
-      {"rotations", "of clusters, row by row"},
+      {"rest", "rest positions of particles [m]"},
+      {"mass", "masses of particles [kg]"},
+      {"removed", "all particles removed by cuts"},
+      {"velocities", "velocities of particles [m/s]"},
+      {"rotations", "rotations of clusters, row by row"},
       {"rest_centers", "weighted means of rest positions [m]"},
       {"cluster_masses", "sums of weights [kg]"},
-      {"numbers", "of clusters, by which verdicts name them"},
-      {"vertices", "of the skin [m]"},
-      {"triangles", "of the skin: vertices, counter-clockwise from outside"},
+      {"numbers", "numbers of clusters, used in verdicts"},
+      {"vertices", "vertices of the skin [m]"},
+      {"triangles", "triangles of the skin, counter-clockwise from outside"},
       {"vertex_owner", "particle on whose grid edge a vertex lies"},
-      {"vertex_direction", "of that edge: 0 to 5 for +x, -x, +y, -y, +z, -z"},
-      {"alpha", "how far along its edge a vertex lies"},
+      {"vertex_direction", "direction of that edge: 0 to 5 for +x, -x, +y, -y, +z, -z"},
+      {"alpha", "place of a vertex along its edge"},
       {"tau", "a cluster of fewer particles is small"},
-      {"cap", "most particles of a merged cluster"},
-      {"pieces", "how many the tissue is in"},
+      {"cap", "greatest number of particles of a merged cluster"},
+      {"pieces", "number of pieces of tissue"},
   };
   return known;
 }
 
 const std::vector<KnownArray>& foreign_state_texts() {
   static const std::vector<KnownArray> known = {
-      {"promises", "what is to be judged, in words"},
-      {"weights", "of particles in their clusters: 'shared' or 'plain'"},
+      {"promises", "promises to judge, by name"},
+      {"weights", "weights of particles in clusters: 'shared' or 'plain'"},
   };
   return known;
 }

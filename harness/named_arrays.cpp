@@ -36,7 +36,7 @@ std::string what_is_known(std::string_view given, const std::vector<KnownArray>&
                           const std::vector<KnownArray>& more) {
   const std::vector<std::string_view> names = names_of(known, more);
   const std::string meant = nearest_word(given, names);
-  return fmt::format("{}These are known: {}.", meant.empty() ? "Leave it out. " : "Did you mean '" + meant + "'? ",
+  return fmt::format("{}Known names: {}.", meant.empty() ? "Leave it out. " : "Did you mean '" + meant + "'? ",
                      fmt::join(names, ", "));
 }
 
@@ -111,8 +111,7 @@ NamedArrays::NamedArrays(const io::ArrayFile& contents, const std::string& file,
     passed_over.push_back(name);
   }
   if (!passed_over.empty()) {
-    notes_.push_back(fmt::format("Attributes of the file that are not known here were passed over: {}.",
-                                 fmt::join(passed_over, ", ")));
+    notes_.push_back(fmt::format("Unknown attributes of the file were ignored: {}.", fmt::join(passed_over, ", ")));
   }
 }
 

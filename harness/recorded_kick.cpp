@@ -12,19 +12,19 @@ namespace cutproof::harness {
 
 const std::vector<KnownArray>& kick_arrays() {
   static const std::vector<KnownArray> known = {
-      {"positions", "where particles were, frame by frame [m]"},
+      {"positions", "positions of particles, frame by frame [m]"},
       {"kicked", "the same simulation with a kick of one piece, or with one kick after the other"},
-      {"piece", "which particles belong together"},
-      {"alive", "frame by frame, 1: the particle exists, 0: not yet, or no longer"},
-      {"again", "the first simulation once more: its noise"},
-      {"kicked_piece", "which piece was kicked, of each kick"},
-      {"directions", "of each kick, of any length"},
-      {"equal", "kicks that are to be answered equally have the same number, below 0: none"},
+      {"piece", "pieces: particles that belong together"},
+      {"alive", "frame by frame, 1: the particle exists, 0: it does not"},
+      {"again", "the first simulation repeated, to measure its noise"},
+      {"kicked_piece", "piece that each kick moved"},
+      {"directions", "direction of each kick, of any length"},
+      {"equal", "kicks with equal answers have the same number; below 0: none"},
       {"tolerance", "share of a kick that other pieces may feel"},
-      {"mass", "of particles [kg]"},
+      {"mass", "masses of particles [kg]"},
       {"steps", "substeps in a frame"},
       {"spacing", "h [m], for the report"},
-      {"time", "when each frame was [s], for the report"},
+      {"time", "time of each frame [s], for the report"},
   };
   return known;
 }
@@ -60,7 +60,7 @@ void read_kicks(const NamedArrays& in, oracles::KickedRuns& runs) {
     for (std::size_t k = 0; k < group.size(); ++k) {
       if (group[k] >= 0 && std::count(group.begin(), group.end(), group[k]) == 1) {
         in.refuse("equal", fmt::format("Only kick {} has the number {}.", k, group[k]),
-                  "Give kicks that are to be answered equally the same number, and a kick by itself -1.");
+                  "Give kicks with equal answers the same number, and a single kick -1.");
       }
       runs.kicks[k].equal = group[k];
     }

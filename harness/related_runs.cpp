@@ -138,7 +138,7 @@ std::vector<int32_t> permutation_of(const OpenRun& a, const OpenRun& b) {
   }
   const std::vector<Vec3>&rest = a.header().rest, &mixed = b.header().rest;
   if (rest.empty() || rest.size() != mixed.size())
-    throw InputError(b.path(), "permutation", "Nothing says which particle is which.",
+    throw InputError(b.path(), "permutation", "The correspondence of particles is missing.",
                      "Write permutation, or rest in both.");
   std::unordered_map<Vec3, int32_t, HashOfPlace> by_place;
   for (std::size_t i = 0; i < rest.size(); ++i) {
@@ -173,7 +173,7 @@ int64_t go_to_checkpoint(OpenRun& first, const OpenRun& later, const std::vector
     const RelatedRun now = first.where();
     const std::optional<double> begins = later.where().frame.time;
     if (!now.frame.time || !begins)
-      throw InputError(first.path(), "time", "Nothing says when frames are.", "Write time in both.");
+      throw InputError(first.path(), "time", "The times of frames are missing.", "Write time in both.");
     // Sums of steps round.
     const double rounds = 4 * std::max(first.header().u, later.header().u) *
                           static_cast<double>((now.frame.index + 1) * first.header().steps) * std::abs(*begins);
@@ -241,7 +241,7 @@ JudgedRelation judge_related(const oracles::RunMap& map, OpenRun& first,
       break;
     }
     if (map.needs_time() && !first.where().frame.time)
-      throw InputError(first.path(), "time", "A boost needs to know when frames are.", "Write time.");
+      throw InputError(first.path(), "time", "A boost needs the times of frames.", "Write time.");
     if (judged.frames == 0) {
       if (map.name() == "permute") relation->permute(judged.permutation = permutation_of(first, *others.front()));
       relation->weigh(first.mass(), second.mass());

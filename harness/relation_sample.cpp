@@ -91,14 +91,12 @@ std::vector<Verdict> RelationSample::ask(const State& begin, int64_t turn) {
 std::vector<std::string> RelationSample::notes() const {
   const bool runs_frames = second_->can_run({});
   if (!runs_frames && !second_->can_run({Stage::step, Stage::step})) {
-    return {
-        "This backend runs neither whole frames nor the step by itself: no relation between its runs could be "
-        "asked of it."};
+    return {"This backend runs neither whole frames nor the step alone: no relation between runs could be judged."};
   }
   std::vector<std::string> notes = {fmt::format(
-      "Relations between runs were asked in {} of {} frames: every {}th, after each cut, and where pieces are new.",
-      asked_, frames_, kFramesBetweenSamples)};
-  if (!runs_frames) notes.push_back("This backend runs no whole frames: 'no ghost force' could not be asked of it.");
+      "Relations between runs were judged in {} of {} frames: every {}th, after each cut, and at new pieces.", asked_,
+      frames_, kFramesBetweenSamples)};
+  if (!runs_frames) notes.push_back("This backend runs no whole frames: 'no ghost force' could not be judged.");
   return notes;
 }
 

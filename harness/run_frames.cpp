@@ -36,41 +36,41 @@ uint32_t promises_of(const NamedArrays& in, const std::string& text) {
 
 const std::vector<KnownArray>& run_arrays() {
   static const std::vector<KnownArray> known = {
-      {"rest", "where particles are at rest [m]"},
-      {"mass", "of particles [kg]"},
+      {"rest", "rest positions of particles [m]"},
+      {"mass", "masses of particles [kg]"},
       {"gravity", "[m/s²]"},
       {"spacing", "h [m]"},
       {"steps", "substeps in a frame"},
       {"damping", "c [1/s]: velocities decay as exp(-c t)"},
       {"edges", "pairs of particles that are tissue"},
       {"nodes", "integer coordinates at rest"},
-      {"cut_resolution", "how far a cut may lie beside the sweep [m]"},
-      {"unit_roundoff", "of the simulator's arithmetic"},
-      {"positions", "where particles are, frame by frame [m]"},
-      {"time", "of each frame [s]"},
+      {"cut_resolution", "greatest distance of a cut from the sweep [m]"},
+      {"unit_roundoff", "unit roundoff of the simulator's arithmetic"},
+      {"positions", "positions of particles, frame by frame [m]"},
+      {"time", "time of each frame [s]"},
       {"velocities", "[m/s]"},
       {"alive", "frame by frame, 1: the particle exists"},
       {"held", "frame by frame, 1: its motion is prescribed"},
-      {"removed", "frame by frame, 1: a cut has taken it out"},
-      {"contact_impulse", "of each frame [kg m/s]"},
+      {"removed", "frame by frame, 1: a cut has removed the particle"},
+      {"contact_impulse", "impulse of each frame [kg m/s]"},
       {"spin", "angular momentum that particles carry [kg m²/s]"},
-      {"energy", "of each frame [J]"},
-      {"blade", "patches that it sweeps in each frame"},
+      {"energy", "energy of each frame [J]"},
+      {"blade", "patches that the blade sweeps in each frame"},
       {"groups_offsets", "where each coupling group begins"},
-      {"groups_members", "particles, group by group"},
-      {"groups_weights", "of each member"},
+      {"groups_members", "particles of coupling groups, group by group"},
+      {"groups_weights", "weight of each member"},
       {"cells", "corners of tetrahedra or hexahedra"},
-      {"parent", "which particle a new one was split from"},
-      {"piece", "the simulator's word on pieces"},
-      {"permutation", "of each particle, which one of a related run it is"},
-      {"vertices", "of the skin [m]"},
-      {"triangles", "of the skin"},
+      {"parent", "parent of each particle that was split off"},
+      {"piece", "pieces according to the simulator"},
+      {"permutation", "corresponding particle of a related run"},
+      {"vertices", "vertices of the skin [m]"},
+      {"triangles", "triangles of the skin"},
   };
   return known;
 }
 
 const std::vector<KnownArray>& run_texts() {
-  static const std::vector<KnownArray> known = {{"promises", "what the run vouches for"}};
+  static const std::vector<KnownArray> known = {{"promises", "promises of the run, by name"}};
   return known;
 }
 
@@ -199,7 +199,7 @@ oracles::RunHeader RunSegment::header() const {
   if (const Array* const gravity = in_.find("gravity", {3})) {
     header.gravity = in_.vectors(*gravity).front();
     if (!is_finite(*header.gravity))
-      in_.refuse("gravity", "It holds what is no number.", "Write m/s², or leave it out.");
+      in_.refuse("gravity", "It contains a value that is not a number.", "Write m/s², or leave it out.");
   }
   if (const Array* const edges = in_.find("edges", {-1, 2})) {
     const std::vector<int32_t> ends = in_.integers(*edges);
@@ -211,7 +211,7 @@ oracles::RunHeader RunSegment::header() const {
   header.u = positive("unit_roundoff", unit_roundoff(precision_), false);
   if (header.u > 0x1p-12) {
     in_.refuse("unit_roundoff", fmt::format("It is {}. Half precision has too few digits to be judged.", header.u),
-               "Write what the arithmetic rounds by, in single precision 6e-8.");
+               "Write the unit roundoff of the arithmetic: 6e-8 in single precision.");
   }
   header.steps = in_.whole_number("steps").value_or(1);
   if (header.steps < 1) in_.refuse("steps", fmt::format("It is {}.", header.steps), "Write the substeps in a frame.");

@@ -61,7 +61,7 @@ void RunSkin::finish(bool is_promised, JudgedRun& judged) const {
                                                                               : "needs tissue"});
   }
   judged.not_judged.push_back(
-      {"skin geometry", "whether a skin crosses itself is judged at rest, and where its vertices rest is not known"});
+      {"skin geometry", "self-intersection is judged at rest, and the rest positions of its vertices are not known"});
 }
 
 }  // namespace cutproof::harness

@@ -102,7 +102,7 @@ const State& RunStates::after(int64_t frame) {
   while (at_ < frame) {
     if (!frames_->next()) {
       throw InputError(open_().source(), "", "The run has become shorter since it was judged.",
-                       "Let nobody write it meanwhile.");
+                       "Do not write the run while it is judged.");
     }
     take();
   }

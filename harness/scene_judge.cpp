@@ -79,7 +79,7 @@ void SceneJudge::finish() {
   not_reached_ = std::move(expected.not_reached);
   not_its_own_ = std::move(expected.not_its_own);
   if (none_reached && !not_reached_.empty()) {
-    note("The run stops before anything that the scene expects could be told: no outcome was held against it.");
+    note("The run ends before any expectation of the scene could be judged.");
   }
   const auto frames = static_cast<double>(setup_.frame_count()), seen = static_cast<double>(judge_.frame());
   if (!is_stopped_)
@@ -88,7 +88,7 @@ void SceneJudge::finish() {
   for (const auto& [property, looked] : properties) {
     if (looked.checked > 0 || looked.excused) continue;
     whole("every property looked at something", false, 1,
-          fmt::format("'{}' holds, but it looked at nothing and does not say why", property));
+          fmt::format("'{}' holds, but it judged nothing and gives no reason", property));
   }
   int64_t judged = 0;
   for (const PropertySummary& summary : summaries_.all()) judged += summary.judged;
@@ -112,11 +112,9 @@ bool SceneJudge::holds() const {
 
 std::vector<std::string> SceneJudge::notes_beside_lists() const {
   std::vector<std::string> notes;
-  if (!expectations_.any()) notes.push_back("The scene expects nothing: no outcome was held against it.");
+  if (!expectations_.any()) notes.push_back("The scene has no expectations: no outcome was compared.");
   if (depth_ == Depth::topology) {
-    notes.push_back(
-        "Only the topology was judged: whether each step is one that could be made, and relations between runs, were "
-        "not asked.");
+    notes.push_back("Only the topology was judged, not the motion of each step, and no relations between runs.");
   }
   notes.insert(notes.end(), notes_.begin(), notes_.end());
   return notes;
@@ -126,8 +124,8 @@ std::vector<std::string> SceneJudge::notes() const {
   std::vector<std::string> notes = notes_beside_lists();
   if (const std::vector<std::string> left = left_to_reference(); !left.empty()) notes.push_back(left_in_words(left));
   for (const Judge::Unpromised& u : judge_.unpromised()) {
-    notes.push_back(fmt::format("'{}' is not promised here: of {} states it would not hold in {}.", u.property,
-                                u.states, u.failing));
+    notes.push_back(
+        fmt::format("'{}' is not promised here; of {} states it would fail in {}.", u.property, u.states, u.failing));
   }
   return notes;
 }

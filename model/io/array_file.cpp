@@ -111,7 +111,7 @@ void require_writable_contents(const ArrayFile& contents) {
   for (const std::string_view name : names) {
     require(!name.empty() && name.size() < 200 && name.find_first_of(std::string_view("/\0", 2)) == name.npos &&
                 std::count(names.begin(), names.end(), name) == 1,
-            fmt::format("\"{}\" is no name for an array, or there are two of it.", name));
+            fmt::format("\"{}\" is not a valid name of an array, or is used twice.", name));
   }
 }
 
@@ -126,7 +126,7 @@ const std::string* find_text(const ArrayFile& contents, std::string_view name) {
 
 void refuse_half_precision(const std::string& file, const std::string& name) {
   throw InputError(file, name, "It holds float16. Half precision has three digits, too few to be judged.",
-                   "Write float32 or float64, as it was computed.");
+                   "Write float32 or float64, as computed.");
 }
 
 Array array_of(std::string name, RawNumbers raw, const std::string& file) {
@@ -158,14 +158,15 @@ Array array_of(std::string name, RawNumbers raw, const std::string& file) {
 void ArrayCollector::require_new(const std::string& name) const {
   const bool is_plain = !name.empty() && name.size() < 256 && name.find('/') == std::string::npos;
   if (!is_plain) {
-    throw InputError(file_, name, "This is no name of an array.", "Write all arrays side by side, in no folders.");
+    throw InputError(file_, name, "This is not a valid name of an array.",
+                     "Write all arrays into the root of the file, not into folders.");
   }
   if (find_array(contents_.arrays, name) != nullptr || find_text(contents_, name) != nullptr) {
-    throw InputError(file_, name, "This name is there twice.", "Write each array once.");
+    throw InputError(file_, name, "This name is used twice.", "Write each array once.");
   }
   if (contents_.arrays.size() + contents_.texts.size() >= kMostArrays) {
     throw InputError(file_, name, fmt::format("There are more than {} arrays.", kMostArrays),
-                     "Write only those that are to be read.");
+                     "Write only the arrays that are needed.");
   }
 }
 
@@ -229,7 +230,7 @@ ArrayFile read_array_file(const std::string& path) {
     case Format::hdf5:
       return read_hdf5_arrays(path);
     case Format::empty:
-      throw InputError(path, "", "The file is empty.", "Write it once more.");
+      throw InputError(path, "", "The file is empty.", "Write the file again.");
     case Format::other:
       break;
   }

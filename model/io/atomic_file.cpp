@@ -38,7 +38,7 @@ void require_writable_folder(const std::string& path) {
   if (path.empty()) throw InputError("output", "", "The name of the file to write is empty.", "Give a file name.");
   std::error_code error;
   if (fs::is_directory(path, error) || fs::path(path).filename().empty()) {
-    throw InputError(path, "", "This is the name of a folder, and a file is to be written.",
+    throw InputError(path, "", "This is the name of a folder; a file name is needed.",
                      "Give a file name inside the folder.");
   }
   fs::path folder = fs::path(path).parent_path();

@@ -171,7 +171,7 @@ void require_own_storage(const Id& creation, const std::string& name) {
     const H5Z_filter_t filter =
         H5Pget_filter2(creation.get(), static_cast<unsigned>(k), &flags, &parameters, nullptr, 0, nullptr, &config);
     if (filter < 0 || filter > H5Z_FILTER_SCALEOFFSET) {
-      throw Error(name, fmt::format("It has been through filter {}, which is not one of HDF5's own.", filter));
+      throw Error(name, fmt::format("Its data passed filter {}, which is not one of HDF5's own.", filter));
     }
   }
 }
@@ -243,7 +243,7 @@ void close_on_exec(hid_t file, const std::string& where) {
   check(H5Fget_vfd_handle(file, H5P_DEFAULT, &handle), where);
   const int descriptor = *static_cast<int*>(handle);
   if (::fcntl(descriptor, F_SETFD, FD_CLOEXEC) != 0)
-    throw Error(where, fmt::format("It cannot be kept from other processes: {}.", std::strerror(errno)));
+    throw Error(where, fmt::format("It cannot be locked against other processes: {}.", std::strerror(errno)));
 }
 
 }  // namespace
@@ -477,7 +477,7 @@ std::vector<std::string> names_in(hid_t group, std::size_t most) {
   require_memory();
   Met met{most, {}};
   check(H5Literate(group, H5_INDEX_NAME, H5_ITER_NATIVE, nullptr, see_link, &met), "/");
-  if (met.too_many) throw Error("/", fmt::format("It holds more than {} things.", most));
+  if (met.too_many) throw Error("/", fmt::format("It holds more than {} objects.", most));
   if (met.elsewhere) throw Error(met.names.back(), "This is a link to something elsewhere.");
   std::sort(met.names.begin(), met.names.end());
   return met.names;

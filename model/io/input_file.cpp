@@ -39,7 +39,7 @@ class Descriptor {
     throw MachineError(fmt::format("{}: The file cannot be opened: {}.", path, reason_of(error)));
   }
   if (error == ENOENT) {
-    throw InputError(path, "", "There is no such file.", "Check its name, and the folder it is looked for in.");
+    throw InputError(path, "", "There is no such file.", "Check the name and the folder.");
   }
   throw InputError(path, "", fmt::format("The file cannot be opened: {}.", reason_of(error)),
                    "Check its name and its permissions.");
@@ -48,18 +48,18 @@ class Descriptor {
 void require_regular(const std::string& path, const struct stat& status) {
   if (S_ISREG(status.st_mode)) return;
   const auto refuse = [&](const char* problem, const char* remedy) { throw InputError(path, "", problem, remedy); };
-  if (S_ISDIR(status.st_mode)) refuse("This is a folder, and a file is to be read.", "Give a file inside it.");
+  if (S_ISDIR(status.st_mode)) refuse("This is a folder; a file is needed.", "Give a file inside it.");
   if (S_ISFIFO(status.st_mode)) {
-    refuse("This is a pipe, and a file is to be read.",
-           "Write what comes through it into a file first: COMMAND > FILE, not <(COMMAND) and not COMMAND |.");
+    refuse("This is a pipe; a file is needed.",
+           "Write the output into a file first: COMMAND > FILE, not <(COMMAND) and not COMMAND |.");
   }
-  if (S_ISSOCK(status.st_mode)) refuse("This is a socket, and a file is to be read.", "Give the name of a file.");
-  refuse("This is a device, and a file is to be read.", "Give the name of a file.");
+  if (S_ISSOCK(status.st_mode)) refuse("This is a socket; a file is needed.", "Give the name of a file.");
+  refuse("This is a device; a file is needed.", "Give the name of a file.");
 }
 
 [[noreturn]] void fail_too_large(const std::string& path, std::string_view what, uint64_t most) {
   throw InputError(path, "", fmt::format("The file is too large. {} has at most {}.", what, bytes_text(most)),
-                   "Check that this is the file that was meant, or make it smaller (docs/reference/limits.md).");
+                   "Check that this is the intended file, or make it smaller (docs/reference/limits.md).");
 }
 
 }  // namespace
@@ -89,7 +89,7 @@ std::string read_file(const std::string& path, std::string_view what, uint64_t m
       const int error = errno;
       if (error == ENOMEM) throw std::bad_alloc();
       throw InputError(path, "", fmt::format("The file cannot be read to the end: {}.", reason_of(error)),
-                       "Check that the file is whole and its disk in order.");
+                       "Check that the file is complete and its disk works.");
     }
     if (count == 0) return text;
     if (static_cast<uint64_t>(count) > most - text.size()) fail_too_large(path, what, most);

@@ -27,8 +27,7 @@ std::string position_text(const std::string& text, std::size_t byte) {
 // counts too many at most, and never too few of what the parser makes before it stops.
 void require_within(const std::string& text, const std::string& file, const JsonLimits& limits) {
   constexpr const char* kRemedy =
-      "Check that this is the file that was meant, or make it smaller "
-      "(docs/reference/limits.md).";
+      "Check that this is the intended file, or make it smaller (docs/reference/limits.md).";
   if (text.size() > limits.bytes) {
     throw InputError(
         file, "",
@@ -134,7 +133,7 @@ std::string join(const std::string& path, std::string_view name) {
 
 json parse_json(const std::string& text, const std::string& file, const JsonLimits& limits, const std::string& remedy) {
   if (text.find_first_not_of(" \t\r\n") == std::string::npos)
-    throw InputError(file, "", "The file is empty, or not whole.", remedy);
+    throw InputError(file, "", "The file is empty or incomplete.", remedy);
   require_within(text, file, limits);
   PathTracker tracker(file);
   try {
@@ -147,13 +146,13 @@ json parse_json(const std::string& text, const std::string& file, const JsonLimi
                               last.find("inf") != std::string::npos;
     if (error.byte > text.size()) {
       throw InputError(file, position_text(text, error.byte),
-                       fmt::format("This is not valid JSON, or not whole: {}.", message),
-                       "Look for what is open at the end, or copy the file again. " + remedy);
+                       fmt::format("This is not valid JSON, or incomplete: {}.", message),
+                       "Close what is open at the end, or copy the file again. " + remedy);
     }
     throw InputError(
         file, position_text(text, error.byte), fmt::format("This is not valid JSON: {}.", message),
         is_no_number
-            ? "If this is NaN or Infinity: neither is a value in JSON. Give a finite number."
+            ? "JSON has neither NaN nor Infinity: give a finite number."
             : "Correct the JSON there: fields are \"name\": value, separated by commas, without comments. " + remedy);
   } catch (const json::out_of_range& error) {
     const std::string what = error.what();

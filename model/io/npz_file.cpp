@@ -16,7 +16,7 @@
 namespace cutproof::io {
 namespace {
 
-constexpr const char* kNpzRemedy = "Write the file once more with numpy.savez or numpy.savez_compressed.";
+constexpr const char* kNpzRemedy = "Write the file again with numpy.savez or numpy.savez_compressed.";
 constexpr std::string_view kMagic = "\x93NUMPY";
 // Deflate shrinks by at most 1032.
 constexpr uint64_t kMostDeflation = 1100;
@@ -157,7 +157,7 @@ class NpzReader {
       archive_.emplace(path_);
       if (archive_->count() > kMostArrays) {
         refuse("", fmt::format("There are {} arrays, more than {}.", archive_->count(), kMostArrays),
-               "Write only those that are to be read.");
+               "Write only the arrays that are needed.");
       }
       entries_ = archive_->entries();
     } catch (const DamagedArchive& error) {

@@ -63,7 +63,7 @@ class ReadingArchive {
       if constexpr (NamedChoice<T>) {
         const std::string found = hdf5::read_text_attribute(group_, name);
         const auto choice = choice_named<T>(found);
-        if (!choice) throw hdf5::Error(name, fmt::format("This is \"{}\", which is none of its names.", found));
+        if (!choice) throw hdf5::Error(name, fmt::format("This is \"{}\", which is not one of the names.", found));
         value = *choice;
       } else if constexpr (std::is_same_v<T, std::string>) {
         value = hdf5::read_text_attribute(group_, name);

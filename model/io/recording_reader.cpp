@@ -33,8 +33,7 @@
 namespace cutproof::io {
 namespace {
 
-constexpr const char* kRemedy =
-    "Copy all files of the recording once more from where they were made, or record the scene again.";
+constexpr const char* kRemedy = "Copy all files of the recording again, or record the scene again.";
 
 // A file of a recording, opened and recognised.
 hdf5::File open_part(const std::string& path, const char* kind) {
@@ -63,7 +62,7 @@ hdf5::File open_part(const std::string& path, const char* kind) {
   try {
     hdf5::File file = hdf5::File::open(path);
     if (!hdf5::has_attribute(file.id(), "cutproof_file") || !hdf5::has_attribute(file.id(), "cutproof_format")) {
-      throw InputError(path, "cutproof_file", "This is an HDF5 file, but no recording.",
+      throw InputError(path, "cutproof_file", "This HDF5 file is not a recording.",
                        "Give a recording made by cutproof.");
     }
     const std::string found = hdf5::read_text_attribute(file.id(), "cutproof_file");
@@ -353,8 +352,8 @@ Snapshot RecordingReader::File::snapshot(std::size_t i) const {
 
 // Whoever has written them need not: then they show nothing.
 constexpr const char* kShownRemedy =
-    "Copy all files of the recording once more from where they were made, or record the scene again. A program that "
-    "writes recordings can leave out the group VTKHDF/Steps.";
+    "Copy all files of the recording again, or record the scene again. A program that writes recordings can leave out "
+    "the group VTKHDF/Steps.";
 
 // What a step has to show of the particles or of the skin, but for what depends on what else is in the file.
 ShownStep RecordingReader::File::shown(IndexSpace points, std::size_t step) const {

@@ -35,7 +35,7 @@ constexpr std::size_t kMostSteps = 40;
 std::vector<Step> steps_of(const SceneChange& change) {
   const auto refuse_path = [&] {
     refuse(
-        change, "This is no path to a field.",
+        change, "This is not a path to a field.",
         "Write names with dots between them, and numbers of entries in brackets, from 0: blade.strokes[0].points[1].");
   };
   std::vector<Step> steps;
@@ -76,7 +76,7 @@ json value_of(const SceneChange& change) {
 json& place_of(const SceneChange& change, json& here, const Step& step) {
   if (const auto* const name = std::get_if<std::string>(&step)) {
     if (!here.is_object()) {
-      refuse(change, fmt::format("\"{}\" would be a field of what has none: {}.", *name, here.type_name()),
+      refuse(change, fmt::format("\"{}\" would be a field of a value without fields: {}.", *name, here.type_name()),
              "Give a path that the scene has, or the whole value.");
     }
     return here[*name];
@@ -85,7 +85,7 @@ json& place_of(const SceneChange& change, json& here, const Step& step) {
   if (!here.is_array() || index >= here.size()) {
     refuse(change,
            here.is_array() ? fmt::format("There is no entry {}: the list has {}, counted from 0.", index, here.size())
-                           : fmt::format("There is no entry {} of what is no list.", index),
+                           : fmt::format("There is no entry {}: the value is not a list.", index),
            "Give an entry that the scene has, or the whole list.");
   }
   return here[index];

@@ -110,7 +110,7 @@ void read(const json& value, const Place& at, const SceneField& field, std::stri
   if (text.size() > field.most) {
     at.fail(fmt::format("The text has {} bytes, more than {}.", text.size(), field.most), "Write a shorter one.");
   }
-  if (text.find('\0') != std::string::npos) at.fail("The text holds a NUL.", "Write it without.");
+  if (text.find('\0') != std::string::npos) at.fail("The text contains a NUL character.", "Leave the character out.");
   out = text;
 }
 
@@ -150,7 +150,7 @@ template <NamedChoice E>
 void read(const json& value, const Place& at, const SceneField&, E& out) {
   const auto choice = value.is_string() ? choice_named<E>(value.get<std::string>()) : std::nullopt;
   if (!choice) {
-    at.fail(fmt::format("{} is none of the known words.", type_text(value)),
+    at.fail(fmt::format("{} is not one of the known words.", type_text(value)),
             fmt::format("Give one of {}.", all_names<E>("\"")));
   }
   out = *choice;
@@ -171,7 +171,7 @@ void read(const json& value, const Place& at, const SceneField& field, std::vect
   require(value.is_array(), "A list", value, at, "Put the entries in square brackets.");
   if (value.size() > field.most) {
     at.fail(fmt::format("The list has {} entries, more than {}.", value.size(), field.most),
-            "Leave some out, or make several scenes of them.");
+            "Leave some out, or make several scenes.");
   }
   out.clear();
   for (std::size_t i = 0; i < value.size(); ++i) read(value[i], at.entry(i), field, out.emplace_back());
@@ -186,7 +186,8 @@ void check(const Shape& s, const Place& at) {
     at.inner("parts").fail("The list of parts is empty or missing.", "Give at least one shape.");
   }
   if (!(norm(s.along) > 1e-150)) {  // its square is a normal number
-    at.inner("along").fail("This is no direction: its length is zero.", "Give the direction of the axis: [0, 0, 1].");
+    at.inner("along").fail("This is not a direction: its length is zero.",
+                           "Give the direction of the axis: [0, 0, 1].");
   }
   if (s.kind == Shape::Kind::torus && s.tube >= s.radius) {
     at.inner("tube").fail(fmt::format("A tube of radius {} closes the hole of a torus of radius {}.", s.tube, s.radius),
@@ -222,7 +223,7 @@ void check(const MeshSpec& s, const Place& at) {
 void check(const StepParameters& s, const Place& at) {
   if (s.solver == Solver::published && s.acceleration != Acceleration::none) {
     at.inner("acceleration")
-        .fail("The solver \"published\" has no converged answer that it could reach sooner.",
+        .fail("The solver \"published\" has no acceleration.",
               "Choose \"solver\": \"implicit\", or \"acceleration\": \"none\".");
   }
   if (s.solver == Solver::published && s.retardation != 0) {
@@ -235,7 +236,7 @@ void check(const StepParameters& s, const Place& at) {
 void check(const DetectFields& s, const Place& at) {
   if (s.parameters.criterion != Criterion::distance && s.parameters.remove != RemovedEnds::both) {
     at.inner("remove").fail(
-        fmt::format("The criterion \"{}\" asks particles, and not edges, of which one end might go.",
+        fmt::format("The criterion \"{}\" judges particles, not edges, so \"remove\" has no choice of ends.",
                     name_of(s.parameters.criterion)),
         "Choose \"criterion\": \"distance\", or \"remove\": \"both\".");
   }
@@ -325,7 +326,7 @@ class Reader {
       const std::string nearest = nearest_word(key, known_);
       at_.inner(key).fail(
           "This field is not known here.",
-          fmt::format("{}Known here are: {}.", nearest.empty() ? "" : fmt::format("Did you mean \"{}\"? ", nearest),
+          fmt::format("{}Known fields: {}.", nearest.empty() ? "" : fmt::format("Did you mean \"{}\"? ", nearest),
                       fmt::join(known_, ", ")));
     }
     if (!missing_.empty()) at_.inner(missing_.front()).fail("This field is missing.", "It must be given.");

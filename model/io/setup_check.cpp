@@ -139,7 +139,7 @@ Defect grid_defect(const Body& body) {
       std::count_if(body.particle_at.begin(), body.particle_at.end(), [](int32_t p) { return p >= 0; });
   const auto empty = std::count(body.particle_at.begin(), body.particle_at.end(), -1);
   if (occupied != static_cast<std::ptrdiff_t>(n) || occupied + empty != rest) {
-    return SetupDefect{"body/particle_at", "A node names a particle that is not there."};
+    return SetupDefect{"body/particle_at", "A node names a particle that does not exist."};
   }
   if (body.surface_crossing.empty()) return std::nullopt;
   if (body.surface_crossing.size() != 6 * n) {
@@ -182,7 +182,7 @@ Defect parameter_defect(const Setup& setup) {
     return SetupDefect{"step/retardation", "The solver \"published\" has no elastic modulus, and so no viscosity."};
   }
   if (setup.detect.criterion != Criterion::distance && setup.detect.remove != RemovedEnds::both) {
-    return SetupDefect{"detect/remove", fmt::format("The criterion \"{}\" asks particles, and not edges.",
+    return SetupDefect{"detect/remove", fmt::format("The criterion \"{}\" judges particles, not edges.",
                                                     name_of(setup.detect.criterion))};
   }
   for (const Wall& wall : setup.walls) {

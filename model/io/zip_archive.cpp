@@ -199,7 +199,7 @@ std::size_t ZipReader::inflate_some(char* to, std::size_t bytes) {
     }
     const int status = inflate(&stream, Z_NO_FLUSH);
     if (status == Z_MEM_ERROR) throw std::bad_alloc();
-    if (status == Z_BUF_ERROR) throw DamagedArchive("what is compressed is cut off");
+    if (status == Z_BUF_ERROR) throw DamagedArchive("its compressed data are cut off");
     if (status != Z_OK && status != Z_STREAM_END) {
       throw DamagedArchive(stream.msg != nullptr ? stream.msg : "it cannot be inflated");
     }
@@ -213,9 +213,9 @@ void ZipReader::require_whole() const {
     throw DamagedArchive(fmt::format("it has {} bytes, and {} by the directory", given_, entry_.bytes));
   }
   if (left_ > 0 || (inflating_ != nullptr && inflating_->stream.avail_in > 0)) {
-    throw DamagedArchive("something lies behind its end");
+    throw DamagedArchive("data follow its end");
   }
-  if (sum_ != entry_.sum) throw DamagedArchive("it does not have the check sum that the directory says");
+  if (sum_ != entry_.sum) throw DamagedArchive("its check sum differs from the directory's");
 }
 
 // --- Writing --------------------------------------------------------------------------------------------------------

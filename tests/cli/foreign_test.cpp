@@ -77,7 +77,7 @@ TEST_F(Foreign, StateOfThePageHolds) {
   EXPECT_EQ(document.at("body").at("particles"), 36);
   EXPECT_NEAR(document.at("body").at("spacing").get<double>(), 0.01, 1e-12);
   EXPECT_EQ(entry(document.at("verdicts"), "edge cover").at("checked"), 75);
-  EXPECT_EQ(entry(document.at("not_judged"), "cap kept").at("why"), "one state does not show what a stage does");
+  EXPECT_EQ(entry(document.at("not_judged"), "cap kept").at("why"), "one state does not show the effect of a stage");
 }
 
 TEST_F(Foreign, StateOfThePageIsRejectedOnceItIsWrong) {

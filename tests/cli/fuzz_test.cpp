@@ -140,7 +140,7 @@ TEST_F(Fuzz, PutsShardsTogetherToTheWhole) {
   const std::string text = read("3.json");
   for (const std::size_t bytes : {text.size() - 3, text.size() / 2, std::size_t{1}, std::size_t{0}}) {
     write("cut_off.json", text.substr(0, bytes));
-    expect_refused("fuzz --merge 1.json 2.json cut_off.json", {"cut_off.json", "not whole"});
+    expect_refused("fuzz --merge 1.json 2.json cut_off.json", {"cut_off.json", "incomplete"});
   }
   for (const char* bad : {"{}", "[]", "1", R"({"format": "cutproof.fuzz", "format_version": 3})"}) {
     write("bad.json", bad);

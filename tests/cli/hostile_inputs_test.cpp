@@ -293,7 +293,7 @@ const std::vector<Hostile>& hostile_inputs() {
       {"AFileNameThatIsNoUtf8", [] { Writer("caf\xe9")("{"); }, "run 'caf\xe9'", {R"(caf\xe9)"}},
       {"ALineEndInAFileName", [] { Writer("two\nlines")("{"); }, "run 'two\nlines'", {R"(two\nlines)", "line end"}},
       {"AnEscapeInAnOption", nothing, "run '--\x1b[31m'", {R"(--\x1b[31m)", "no such option"}},
-      {"AnEscapeInAVerb", nothing, "'\x1b[31mrun'", {R"(\x1b[31mrun)", "no such verb"}},
+      {"AnEscapeInAVerb", nothing, "'\x1b[31mrun'", {R"(\x1b[31mrun)", "no such subcommand"}},
 
       // --- Counterexamples, results of campaigns, questions
       {"ACounterexampleOfATerabyte", sparse("input"), "replay input", {"too large", "8 MiB"}},

@@ -383,7 +383,7 @@ TEST_F(Program, CheckGivesTheVerdictsThatTheRunGave) {
     EXPECT_GT(ran["verdicts"].size(), 500u);
     EXPECT_EQ(without_relations(ran["verdicts"]), checked["verdicts"]);
     EXPECT_GT(ran["verdicts"].size(), checked["verdicts"].size());
-    EXPECT_TRUE(has_note(ran, "Relations between runs were asked in"));
+    EXPECT_TRUE(has_note(ran, "Relations between runs were judged in"));
     EXPECT_TRUE(has_note(checked, "A recording cannot be run"));
     ASSERT_EQ(ran["frames"].size(), checked["frames"].size());
     for (std::size_t f = 0; f < ran["frames"].size(); ++f)

@@ -270,7 +270,7 @@ TEST_F(Screen, SaysSoIfNothingThatIsExpectedWasReached) {
   write("cut_in_two.json", kCut);
   const Outcome outcome = cutproof("run cut_in_two.json --check --frames 2");
   EXPECT_EQ(outcome.status, 0) << outcome.output;
-  EXPECT_NE(on_one_line(outcome.output).find("stops before anything that the scene expects could be told"),
+  EXPECT_NE(on_one_line(outcome.output).find("ends before any expectation of the scene could be judged"),
             std::string::npos)
       << outcome.output;
   // Nothing at all is not enough.

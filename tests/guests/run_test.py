@@ -204,7 +204,7 @@ class Runs(Simulated):
         self.assertEqual(cutproof.relate(both, path, map="permute", bits=True).document["frames"], 6)
         for runs, map, words in (((both, later), "shift", "no map"), ((both, one), "refine", "3 or more"),
                                  ((both, dict(later, time=None)), "checkpoint", "Write time"),
-                                 ((both, both), "permute", "which particle is which"),
+                                 ((both, both), "permute", "correspondence of particles"),
                                  ((both, dict(both, permutation=[0, 1, 2, 2, 4])), "permute", "Name each particle once"),
                                  ((both, dict(later, time=later["time"] + 9)), "checkpoint", "Write a longer one"),
                                  ((both, dict(both, kicked=x)), "same", "Use cutproof kick")):

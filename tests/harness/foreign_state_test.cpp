@@ -676,8 +676,8 @@ TEST(ForeignState, NamesWhatIsNotJudgedAndWhy) {
            {"merge maximality", "the file has no tau"},
            {"tissue kept", "the file has no removed"},
            {"skin surface", "the file has no vertices"},
-           {"cap kept", "one state does not show what a stage does"},
-           {"admissible step", "one state does not show what a stage does"},
+           {"cap kept", "one state does not show the effect of a stage"},
+           {"admissible step", "one state does not show the effect of a stage"},
            {"no pass", "a file of arrays has no blade"}}) {
     EXPECT_EQ(why_not(found, property), why);
     EXPECT_EQ(verdict_on(found, property), nullptr) << property;
@@ -849,7 +849,7 @@ TEST(ForeignState, ThatCannotBeUnderstoodIsRefused) {
       {[](auto& f) {
          put<int32_t>(f, "edges", {0, 2}, {});
        },
-       {"spacing", "No edge has a length"}},
+       {"spacing", "No edge has a positive length"}},
       {[](auto& f) {
          put<double>(f, "vertices", {1, 3}, {0, 0, 0});
        },
@@ -920,7 +920,7 @@ TEST(ForeignState, IsReadAsOtherProgramsWriteIt) {
   attributes.texts = {{"author", "me", true}, {"promises", "covered", true}};
   attributes.ignored = {"frame_rate"};
   EXPECT_THAT(failing(judged(attributes)), IsEmpty());
-  EXPECT_THAT(judged(attributes).notes, Contains(HasSubstr("passed over: author, frame_rate")));
+  EXPECT_THAT(judged(attributes).notes, Contains(HasSubstr("ignored: author, frame_rate")));
 }
 
 TEST(ForeignState, OnAGridMayRestAnywhere) {

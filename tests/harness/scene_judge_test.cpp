@@ -189,7 +189,7 @@ TEST_F(WrongRecording, WithoutExpectationsIsSaidToHaveNone) {
   recorded.scene.expect = {};
   const auto notes = recorded.judged()->notes();
   ASSERT_EQ(notes.size(), 1u);
-  EXPECT_NE(notes[0].find("expects nothing"), std::string::npos) << notes[0];
+  EXPECT_NE(notes[0].find("has no expectations"), std::string::npos) << notes[0];
 }
 
 TEST_F(WrongRecording, WhoseShellsCannotBeCountedIsSaidToHaveThem) {

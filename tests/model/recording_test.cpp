@@ -892,7 +892,7 @@ TEST_F(RecordingTest, IsRefusedIfItIsNoneAtAll) {
   write_bytes(path("signature.cutproof.h5"), "\x89HDF\r\n\x1a\n");
   refused("signature", "cut off or damaged");
   hdf5::File::create(path("other.cutproof.h5")).close();
-  refused("other", "no recording");
+  refused("other", "not a recording");
 
   record("run");
   fs::copy(path("run.particles.vtkhdf"), path("swapped.cutproof.h5"));

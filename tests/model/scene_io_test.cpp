@@ -745,7 +745,7 @@ TEST(SceneIoErrors, ConditionsBetweenFieldsAreChecked) {
   tree["body"]["shape"] = json::parse(R"({"kind": "union", "parts": []})");
   expect_error(tree, "body.shape.parts", {"empty"});
   tree["body"]["shape"] = json::parse(R"({"kind": "cylinder", "along": [0, 0, 0]})");
-  expect_error(tree, "body.shape.along", {"no direction"});
+  expect_error(tree, "body.shape.along", {"not a direction"});
   tree["body"]["shape"] = json::parse(R"({"kind": "torus", "radius": 0.01, "tube": 0.01})");
   expect_error(tree, "body.shape.tube", {"closes the hole", "less than the radius"});
 }

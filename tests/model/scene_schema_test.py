@@ -11,7 +11,7 @@ import jsonschema
 
 # Conditions of the reader that JSON Schema cannot say: each must have occurred.
 BEYOND = ("leave no room", "lies above the upper one", "The grip ends at", "all points of this stroke are the same",
-          "This is no direction", "closes the hole", "shapes in it, more than", "too large to be exact",
+          "This is not a direction", "closes the hole", "shapes in it, more than", "too large to be exact",
           "bytes, more than", "is greater than at_most")
 
 folder, sources = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
