@@ -50,7 +50,7 @@ std::string guest_program() {
     if (fs::exists(place, failed)) return place.string();
   }
   throw MachineError(
-      "the program cutproof-guest, in which plugins run, is not beside cutproof; CUTPROOF_GUEST can name it");
+      "cutproof-guest, the program that runs plugins, is not beside cutproof; CUTPROOF_GUEST can name it");
 }
 
 // True: there is something to read, or the other end is gone.
@@ -100,7 +100,7 @@ Guest::Guest(GuestOptions options)
     throw InputError(options_.library, "", "there is no such file", "name the shared library of a plugin");
   }
   if (!fs::is_regular_file(options_.library, failed)) {
-    throw InputError(options_.library, "", "this is no file", "name the shared library of a plugin");
+    throw InputError(options_.library, "", "this is not a file", "name the shared library of a plugin");
   }
   options_.library = fs::absolute(options_.library).string();
   // Counterexamples and documents name it, and these are UTF-8.
@@ -129,11 +129,11 @@ Guest::Guest(int channel, int memory, double time_limit)
   int type = 0;
   socklen_t size = sizeof type;
   if (getsockopt(channel, SOL_SOCKET, SO_TYPE, &type, &size) != 0 || type != SOCK_SEQPACKET) {
-    refuse(fmt::format("file {} is no socket that keeps messages apart", channel));
+    refuse(fmt::format("file {} is not a socket of separate messages", channel));
   }
   struct stat file = {};
   if (fstat(memory, &file) != 0 || file.st_size != wire::kMemoryBytes) {
-    refuse(fmt::format("file {} is no memory of {} bytes", memory, wire::kMemoryBytes));
+    refuse(fmt::format("file {} is not a memory of {} bytes", memory, wire::kMemoryBytes));
   }
   map();
   running_ = true;
@@ -231,7 +231,7 @@ void Guest::greet(double time_limit) {
     throw InputError(
         options_.library, "",
         fmt::format("{} is of another version than cutproof", attached_ ? "cutproof.py" : "cutproof-guest"),
-        "install both anew");
+        "install both again");
   }
   if (hello->greeting != wire::Greeting::ready) {
     stop();
@@ -246,7 +246,7 @@ void Guest::greet(double time_limit) {
   plugin_.operations = hello->operations;
   plugin_.spans = hello->spans;
   if (hello->real != static_cast<int32_t>(ElementType::f32) && hello->real != static_cast<int32_t>(ElementType::f64)) {
-    throw InputError(options_.library, "real", fmt::format("{} is no type of real numbers", hello->real),
+    throw InputError(options_.library, "real", fmt::format("{} is not a type of real numbers", hello->real),
                      "use CUTPROOF_F32 or CUTPROOF_F64");
   }
   plugin_.precision = hello->real == static_cast<int32_t>(ElementType::f64) ? Precision::binary64 : Precision::binary32;

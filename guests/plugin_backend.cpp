@@ -176,7 +176,7 @@ class PluginBackend final : public Backend {
 
   void load(std::vector<Setup> setups, std::vector<State> states) override {
     if (setups.size() != states.size())
-      throw std::invalid_argument("plugin, load: as many states as setups are needed");
+      throw std::invalid_argument("plugin, load: the numbers of states and setups differ");
     setups_ = std::move(setups);
     states_ = std::move(states);
     setup_arrays_.clear();

@@ -202,8 +202,8 @@ class Swept {
     const std::optional<double> least = least_distance(x);
     if (!least) return "the blade is not down in this frame";
     const double found = *least / h;
-    return sentence("the nearest that the blade comes to it is {} h, and it takes what it comes within {} h of",
-                    figure_beside(found, limit), figure_beside(limit, found));
+    return sentence("the blade comes within {} h of it, and removes particles within {} h", figure_beside(found, limit),
+                    figure_beside(limit, found));
   }
 
  private:

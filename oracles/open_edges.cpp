@@ -190,10 +190,10 @@ void OneEndOfEach::reject(int32_t i, bool gone, Verdict& verdict) const {
   std::string why;
   if (gone) {
     why = edges_at_[at(i)].empty()
-              ? fmt::format("no edge of its is longer than epsilon = {} allows", setup_.detect.epsilon)
-              : "of each of its edges that are too long the other end goes";
+              ? fmt::format("none of its edges is longer than epsilon = {} allows", setup_.detect.epsilon)
+              : "each of its too long edges loses the other end";
   } else if (edge == nullptr) {  // something that rounding decides was held against it
-    why = "no choice of what rounding decides lets it stay";
+    why = "no choice of inconclusive decisions keeps it";
   } else {
     const int32_t other = other_end(*edge, i);
     const double length = norm(before_.x[at(i)] - before_.x[at(other)]) / setup_.body.grid.spacing;
@@ -203,7 +203,7 @@ void OneEndOfEach::reject(int32_t i, bool gone, Verdict& verdict) const {
               ? fmt::format("of its edge to particle {}, {} h long, it is the end {}", other, shown,
                             is_negative(i, never) ? "on the blade's negative side"
                                                   : "that its clusters carry nearer to the blade")
-              : fmt::format("its edge to particle {} is {} h long, and of its edges {} are too long, of the other's {}",
+              : fmt::format("its edge to particle {} is {} h long; its own too long edges are {}, the other's {}",
                             other, shown, open_at(i, never), open_at(other, never));
   }
   violate(verdict, {{}, particles}, "particle {} {} removed, but should {}have been: {}", i, gone ? "was" : "was not",
@@ -237,10 +237,9 @@ void OneEndOfEach::judge(const std::vector<uint8_t>& gone, Verdict& verdict) con
   for (const auto& [root, group] : groups) {
     if (group.bits.size() <= kMostTried) {
       if (is_explained(group.particles, group.bits, gone)) continue;
-      violate(
-          verdict, {{}, group.particles},
-          "no choice of the {} things that rounding decides near particle {} removes these {} particles as they were",
-          group.bits.size(), group.particles.front(), group.particles.size());
+      violate(verdict, {{}, group.particles},
+              "no choice of the {} inconclusive decisions near particle {} explains the removal of these {} particles",
+              group.bits.size(), group.particles.front(), group.particles.size());
       continue;
     }
     for (const int32_t i : group.particles) {

@@ -230,7 +230,7 @@ class Runner {
     if (is_whole && !load->problem.empty() && !load->is_refused && !load->has_violation) {
       part.violations.push_back(
           {load->indices.front(), load->cases.front(),
-           *thrown(load->backend, "(with the other bodies of its load only) " + load->problem).failure});
+           *thrown(load->backend, "(only with the other bodies of its batch) " + load->problem).failure});
     }
     if (!part.violations.empty() && !options_.keep_going) last_wanted_ = std::min<int64_t>(last_wanted_, load->number);
     has_judged_ = true;

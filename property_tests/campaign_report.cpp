@@ -209,7 +209,7 @@ void require_fields(const json& part, const std::string& file) {
   const auto require_count = [&](const json& within, const char* name) {
     const double count = within.at(name).get<double>();
     if (count >= 0 && count <= kMostCounted) return;
-    throw InputError(file, name, fmt::format("{} is no number of things that a campaign has seen", count), kRemedy);
+    throw InputError(file, name, fmt::format("{} is not a count of a campaign", count), kRemedy);
   };
   for (const char* count : kCounts) require_count(part, count);
   for (const char* figure : {"seconds", "cases_per_second"}) static_cast<void>(part.at(figure).get<double>());
@@ -259,7 +259,7 @@ json read_shard(const std::string& file) {
                      "run the campaign again with this version of cutproof");
   }
   if (part.contains("merged_shards")) {
-    throw InputError(file, "merged_shards", "these are shards that were put together already", kRemedy);
+    throw InputError(file, "merged_shards", "this result is merged already", kRemedy);
   }
   const auto shard = integer_from<int64_t>(part.at("shard")), shards = integer_from<int64_t>(part.at("shards"));
   if (shards < 1 || shards > kMostShards || shard < 1 || shard > shards) {
@@ -401,7 +401,7 @@ CampaignConclusion conclude(const json& document, bool whole) {
     return {fmt::format("no case had: {}, so nothing was tested there", fmt::join(empty, ", "))};
   }
   if (meets_every_class && !rare.empty()) {
-    return {fmt::format("of {} cases fewer than one in ten had: {}, so too little was tested there", cases,
+    return {fmt::format("fewer than one in ten of {} cases had: {}, so too little was tested there", cases,
                         fmt::join(rare, ", "))};
   }
   const bool steps = std::find(left.begin(), left.end(), name_of(Stage::step)) == left.end();
@@ -413,9 +413,9 @@ CampaignConclusion conclude(const json& document, bool whole) {
     if (property.at("property") != oracles::kStepByIterates) continue;
     const double undecided = property.at("undecided").get<double>(), checked = property.at("checked").get<double>();
     if (undecided <= kMostUndecided * checked) continue;
-    return {fmt::format(
-        "of {:.0f} things that '{}' looked at after {} {:.0f} stayed undecided, so too little was tested", checked,
-        property.at("property").get<std::string>(), property.at("stage").get<std::string>(), undecided)};
+    return {fmt::format("of {:.0f} comparisons of '{}' after {} {:.0f} were inconclusive, so too little was tested",
+                        checked, property.at("property").get<std::string>(), property.at("stage").get<std::string>(),
+                        undecided)};
   }
   return {};
 }

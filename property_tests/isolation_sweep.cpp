@@ -179,7 +179,7 @@ int main(int argc, char** argv) {
   uint64_t seed = 1;
   CLI::App app{"How often cuts leave connected tissue uncoupled, over the ratio of ball radius to seed spacing"};
   app.add_option("--bodies", bodies, "random bodies, each run at every ratio")->check(CLI::Range(1, 100'000'000));
-  app.add_option("--seed", seed, "what bodies, cuts and clusters are drawn from");
+  app.add_option("--seed", seed, "seed of bodies, cuts and clusters");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

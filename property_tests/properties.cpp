@@ -395,7 +395,7 @@ void expect_same_bits(const std::string& id, int64_t cases, Paths& paths) {
       cut += std::any_of(together.begin(), together.end(), [](const State& s) { return !s.removed.empty(); });
     }
     for (auto& [name, backend] : paths) {
-      if (run(*backend, setups, states) != expected) return name + " gives other bits in a load";
+      if (run(*backend, setups, states) != expected) return name + " gives other bits in a batch";
       for (const std::size_t k : {std::size_t{0}, std::size_t{1}}) {
         const auto alone = run(*backend, {setups[k]}, {states[k]});
         for (std::size_t frame = 0; frame < alone.size(); ++frame) {

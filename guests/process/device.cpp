@@ -56,7 +56,7 @@ void* device_stream() { return stream; }
 bool open_device(std::string& problem) {
   void* const library = dlopen("libcuda.so.1", RTLD_NOW);
   bool fine = library != nullptr;
-  if (!fine) last_problem = "it wants a CUDA device, and there is no CUDA driver here";
+  if (!fine) last_problem = "it needs a CUDA device, and there is no CUDA driver here";
   fine = fine && find(library, driver.init, "cuInit") && find(library, driver.device_get, "cuDeviceGet") &&
          find(library, driver.retain, "cuDevicePrimaryCtxRetain") &&
          find(library, driver.set_current, "cuCtxSetCurrent") &&
@@ -67,8 +67,8 @@ bool open_device(std::string& problem) {
          find(library, driver.set, "cuMemsetD8_v2") && find(library, driver.name_of, "cuGetErrorName");
   int device = 0;
   void* context = nullptr;
-  fine = fine && works(driver.init(0), "it wants a CUDA device: cuInit") &&
-         works(driver.device_get(&device, 0), "it wants a CUDA device: cuDeviceGet") &&
+  fine = fine && works(driver.init(0), "it needs a CUDA device: cuInit") &&
+         works(driver.device_get(&device, 0), "it needs a CUDA device: cuDeviceGet") &&
          works(driver.retain(&context, device), "cuDevicePrimaryCtxRetain") &&
          works(driver.set_current(context), "cuCtxSetCurrent") &&
          works(driver.stream_create(&stream, 1), "cuStreamCreate");

@@ -406,7 +406,7 @@ void answer(wire::Reply& reply) {
   }
   void* self = nullptr;
   if (!instance(call.request.instance, self)) {
-    call.broken = "create() gave nothing, and had given something before";
+    call.broken = "create() returned nothing, although an earlier call returned an object";
   } else if (!call.device_failed) {
     reply.code = ask(self);
     if (reply.code != 0) reply.outcome = wire::Outcome::refused;
@@ -531,7 +531,7 @@ void greet(wire::Hello& hello, const char* library) {
   void* self = nullptr;
   if (!instance(0, self)) {
     hello.greeting = wire::Greeting::cannot_run_here;
-    put(hello.text, "its create() gave nothing: it cannot run here");
+    put(hello.text, "its create() returned nothing: it cannot run here");
   }
 }
 
@@ -539,7 +539,7 @@ void greet(wire::Hello& hello, const char* library) {
 
 int main(int argc, char** argv) {
   if (argc != 4) {
-    std::fputs("cutproof-guest is started by cutproof: it is not to be called\n", stderr);
+    std::fputs("cutproof starts cutproof-guest: do not call it directly\n", stderr);
     return 2;
   }
   const rlimit none = {0, 0};

@@ -543,7 +543,7 @@ class _Guest:
                 if received == 0:
                     return
                 if received != ctypes.sizeof(request):
-                    raise Error("cutproof is of another version than cutproof.py: install both anew")
+                    raise Error("cutproof is of another version than cutproof.py: install both again")
                 ctypes.memset(ctypes.byref(reply), 0, ctypes.sizeof(reply))
                 self._answer(request, reply)
                 channel.send(reply)

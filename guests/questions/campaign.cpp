@@ -232,7 +232,7 @@ std::vector<Verdict> judge_answer(Guest& guest, const OperationDescription& oper
   const Answer second = ask(guest, operation, question, !at_end);
   const bool answered = second.kind == Answer::Kind::answered, is_same = answered && second.arrays == answer.arrays;
   if (again) {
-    std::string how = second.text.empty() ? "asked again it answers otherwise" : second.text;
+    std::string how = second.text.empty() ? "asked again, it gives another answer" : second.text;
     if (answered && !is_same && operation.difference != nullptr)
       how = operation.difference(question, answer.arrays, second.arrays);
     Verdict same = of_all_cases("determinism", how);
@@ -437,7 +437,7 @@ SavedQuestion question_from_json(const std::string& text, const std::string& fil
   SavedQuestion saved;
   try {
     const json j = io::parse_json(text, file, io::kQuestionLimits, std::string(kWhatToGive) + ".");
-    if (!j.is_object() || j.value("format", "") != kFormat) throw refuse("it is no question to a kernel");
+    if (!j.is_object() || j.value("format", "") != kFormat) throw refuse("it is not a question to a kernel");
     if (j.at("format_version") != kFormatVersion) {
       throw refuse(
           fmt::format("it has version {}, and this cutproof reads {}", j.at("format_version").dump(), kFormatVersion));
@@ -497,7 +497,7 @@ SavedQuestion question_from_json(const std::string& text, const std::string& fil
       if (array.name == "node" || array.name == "nodes" || find_array(saved.question.given, array.name)) continue;
       throw refuse("'" + array.name + "' is missing");
     }
-    if (saved.question.known.size() != grid_model.known.size()) throw refuse("what the judge has to know is missing");
+    if (saved.question.known.size() != grid_model.known.size()) throw refuse("data for the judge is missing");
     if (const std::string problem = operation->problem(saved.question); !problem.empty()) throw refuse(problem);
   } catch (const json::exception& error) {
     throw refuse(error.what());

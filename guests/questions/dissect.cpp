@@ -247,7 +247,7 @@ std::vector<Question> simpler_scenes(const Question& question) {
 const OperationDescription kDissect = {
     .number = wire::dissect,
     .name = "dissect",
-    .text = "a whole simulator: what becomes of a body that is cut",
+    .text = "a whole simulator: the run of a body that is cut",
     .by_itself = "",
     .answers = kRunAnswers,
     .cases = "scenes",

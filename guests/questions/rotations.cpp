@@ -237,7 +237,7 @@ std::vector<Verdict> judge_rotations(const Question& question, const Arrays& ans
     const uint8_t what = expected[at(found->worst)];
     if (what != 2) it.best = reference::closest_rotation(it.a, it.previous).r;
     const double measured = verdict.measured;
-    const std::string wrong = found == &kept      ? "nothing is known of the rotation, and it is not the previous one"
+    const std::string wrong = found == &kept      ? "the rotation is undetermined, and it is not the previous one"
                               : found == &nearest ? fmt::format("{:.2g} from the nearest one to the previous", measured)
                               : found == &best    ? fmt::format("tr(RᵀA) is {:.2g} of Σσ below the best", measured)
                               : fixtures::orthogonality(it.r) <= bounds.orthogonality
@@ -258,7 +258,7 @@ std::string problem_of_rotations(const Question& question) {
     const bool known = std::all_of(a.m.begin(), a.m.end(), [](double entry) { return std::isfinite(entry); }) &&
                        std::any_of(a.m.begin(), a.m.end(), [](double entry) { return entry != 0; });
     if (expected[at(row)] > 2 || (expected[at(row)] != 2 && !known)) {
-      return fmt::format("what is expected of matrix {} is not what can be", row);
+      return fmt::format("the expectation of matrix {} is impossible", row);
     }
   }
   return "";

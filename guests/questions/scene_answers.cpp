@@ -70,7 +70,7 @@ RunFiles run_files(const Question& question, const Arrays& answers, Precision pr
               &weights = answer("weights"), &cell_count = answer("cell_count");
   const bool has_groups = group_count.rows() > 0, has_cells = cell_count.rows() > 0;
   if (answer("tetrahedra").rows() > 0 && answer("hexahedra").rows() > 0)
-    return refuse("'run/tetrahedra' and 'run/hexahedra' are both given; one of them is wanted");
+    return refuse("'run/tetrahedra' and 'run/hexahedra' are both given; give one of them");
   if (weights.rows() > 0 && !has_groups) return refuse("'run/weights' is given, and no groups are");
   const std::string cells_name = answer("tetrahedra").rows() > 0 ? "tetrahedra" : "hexahedra";
   const Array& cells = answer(cells_name);

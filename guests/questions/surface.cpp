@@ -500,7 +500,7 @@ std::vector<Verdict> judge_surface(const Question& question, const Arrays& answe
   check_places(surface, nodes, precision, places);
   check_surface(surface, closed);
   if (!places.holds || !closed.holds) {
-    shells.vacuous = "what is no surface around the tissue has no shells";
+    shells.vacuous = "only a surface around the tissue has shells";
   } else {
     check_shells(surface, nodes, precision, shells);
   }

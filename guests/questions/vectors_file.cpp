@@ -301,38 +301,31 @@ std::string acceptable_text(const Vectors& vectors) {
     const fixtures::RotationBounds bounds = fixtures::rotation_bounds(vectors.precision);
     return fmt::format(
         "rotation: every answer is finite, |R^T R - I| (Frobenius) is at most bound_orthogonality = {:.4g}, and det R "
-        "> "
-        "0. Asked where expected is 0 or 1, and where A is zero.\n"
-        "best rotation: where expected is 0 or 1. Divide A by 2^must_exponent; then (must_greatest - tr(R^T A)) / "
-        "must_singular_sum is at most bound_gap = {:.4g}. The answer is unique where must_separation, (sigma2 + s "
-        "sigma3) / sigma1 with s the sign of det A, is not 0; answer_r has it there, and NaN elsewhere.\n"
-        "nearest rotation: where expected is 1, A has rank one and many rotations are best: R is the one nearest to "
-        "previous, within bound_deviation = {:.4g} in the Frobenius norm, times a weight in 0..1 that falls to 0 where "
-        "all are equally near.\n"
-        "previous rotation kept: where expected is 2, nothing is known of the rotation (A is zero or not finite): R is "
-        "previous, to the bit.",
+        "> 0. Asked where expected is 0 or 1, and where A is zero.\nbest rotation: where expected is 0 or 1. Divide A "
+        "by 2^must_exponent; then (must_greatest - tr(R^T A)) / must_singular_sum is at most bound_gap = {:.4g}. The "
+        "answer is unique where must_separation is not 0: (sigma2 + s sigma3) / sigma1 with s the sign of det A. There "
+        "answer_r has this answer, and NaN elsewhere.\nnearest rotation: where expected is 1, A has rank one and many "
+        "rotations are best. R is the one nearest to previous, within bound_deviation = {:.4g} times a weight, in the "
+        "Frobenius norm. The weight lies in 0..1 and falls to 0 where all are equally near.\nprevious rotation kept: "
+        "where expected is 2, the rotation is undetermined (A is zero or not finite). R is previous, to the bit.",
         bounds.orthogonality, bounds.gap, bounds.deviation);
   }
   if (name == "components") {
     return "components: two living particles of a case have the same label exactly where a path of edges between "
-           "living "
-           "particles joins them. Any labels will do; answer_label has the smallest particle of each component, and -1 "
-           "for dead particles, whose labels nobody looks at. There is no tolerance.";
+           "living particles joins them. Any labels will do. answer_label has the smallest particle of each component, "
+           "and -1 for dead particles, whose labels are not judged. There is no tolerance.";
   }
   if (name == "surface") {
     return fmt::format(
         "surface vertices: exactly one vertex on each edge of the grid that leaves the tissue, strictly between its "
         "ends, and no other. must_vertex_edges has the living node (3 columns) and the direction of each such edge (0 "
         "to 5: +x, -x, +y, -y, +z, -z). Across the edge, a place may be off by bound_place = {:.4g} times its greatest "
-        "coordinate in spacings, or times 1.\n"
-        "surface: closed, oriented and 2-manifold. Each directed edge of a triangle is there once, its reverse once; "
-        "the triangles at a vertex form one fan; each vertex is used. Triangles are counter-clockwise seen from "
-        "outside.\n"
-        "surface places: each vertex lies in a cell of the grid that has living and empty corners, or on its "
-        "boundary.\n"
-        "surface shells: must_outer_shells closed parts of positive volume, one around each component, and "
-        "must_inner_shells of negative volume, one around each cavity. Nodes are joined by edges of the grid; empty "
-        "ones also across the diagonals of faces.",
+        "coordinate in spacings, or times 1.\nsurface: closed, oriented and 2-manifold. Each directed edge of a "
+        "triangle is there once, its reverse once; the triangles at a vertex form one fan; each vertex is used. "
+        "Triangles are counter-clockwise seen from outside.\nsurface places: each vertex lies in a cell of the grid "
+        "that has living and empty corners, or on its boundary.\nsurface shells: must_outer_shells closed parts of "
+        "positive volume, one around each component; must_inner_shells of negative volume, one around each cavity. "
+        "Nodes are joined by edges of the grid; empty ones also across the diagonals of faces.",
         8 * unit_roundoff(vectors.precision));
   }
   constexpr const char* kForm =
@@ -350,24 +343,21 @@ std::string acceptable_text(const Vectors& vectors) {
   const std::string form = fmt::format(kForm, "Numbers are not negative and ascend.");
   if (name == "split") {
     return form +
-           "split exactness: the answer is unique. Components of living particles with fewer than debris members are "
-           "gone first, and alive says so. A cluster that has lost nothing stays as it is. Each other one is replaced "
-           "by the connected components of what is left of it: the one with the smallest particle keeps its number, "
-           "the others get new numbers, from the greatest number plus 1, ordered by the old cluster and by their "
-           "smallest particles. origin, if it is given, is the number of the cluster that each comes from. The answer "
-           "is in answer_alive, answer_offsets, answer_members, answer_number and answer_origin. There is no "
-           "tolerance.";
+           "split exactness: the answer is unique. First, components of fewer than debris living particles are "
+           "removed, which alive shows. A cluster without a lost particle is unchanged. Each other cluster is replaced "
+           "by the connected components of its rest. The component with the smallest particle keeps the number. The "
+           "others get new numbers, from the greatest number plus 1, ordered by the old cluster and by their smallest "
+           "particles. origin, if given, is the number of the cluster that each component comes from. The answer is in "
+           "answer_alive, answer_offsets, answer_members, answer_number and answer_origin. There is no tolerance.";
   }
   return form +
-         "merge legality: each cluster of the answer is one of the question, or a union of several that touch each "
-         "other (share a particle, or an edge between living particles joins them), under the number of one of them; "
-         "no "
-         "cluster is used twice or lost; only clusters of fewer than tau particles are merged away.\n"
-         "cap kept: no union has more than cap particles, unless all of it lay in one cluster before.\n"
-         "merge maximality: no cluster of fewer than tau particles is left that touches another with which it would "
-         "have at most cap particles, or that lies within another.\n"
-         "There is no tolerance, and many answers are right. example_offsets, example_members and example_number have "
-         "one of them.";
+         "merge legality: each cluster of the answer is one of the question, or a union of several touching ones under "
+         "the number of one of them. Clusters touch if they share a particle or if an edge between living particles "
+         "joins them. No cluster is used twice or lost. Only clusters of fewer than tau particles are merged "
+         "away.\ncap kept: no union has more than cap particles, unless all of them lay in one cluster before.\nmerge "
+         "maximality: no cluster of fewer than tau particles lies within another, or touches one with which it would "
+         "have at most cap particles.\nThere is no tolerance, and many answers are right. example_offsets, "
+         "example_members and example_number have one right answer.";
 }
 
 // Texts as they stand in a file.

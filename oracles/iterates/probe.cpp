@@ -187,17 +187,15 @@ Witness IterateProbe::witness(const State& began, int32_t substep, const Iterate
   const double h = setup_.body.grid.spacing;
   if (found.part == IteratePart::place || found.part == IteratePart::contact || found.part == IteratePart::velocity) {
     const char* times = found.part == IteratePart::velocity ? " times dt" : "";
-    return witness_of(
-        concerned,
-        "after {} of substep {}, the {} {}{} is {:.3g} h from what follows from the iterate before, rounding "
-        "explains {:.3g} h",
-        after, substep + 1, name_of(found.part), whose, times, found.measured / h, found.bound / h);
+    return witness_of(concerned,
+                      "after {} of substep {}, the {} {}{} is {:.3g} h from the result that follows from the previous "
+                      "iterate, rounding explains {:.3g} h",
+                      after, substep + 1, name_of(found.part), whose, times, found.measured / h, found.bound / h);
   }
-  return witness_of(
-      concerned,
-      "after {} of substep {}, the {} {} is {:.3g} times as far as rounding explains from what follows from "
-      "the iterate before",
-      after, substep + 1, name_of(found.part), whose, found.share);
+  return witness_of(concerned,
+                    "after {} of substep {}, the {} {} is {:.3g} times as far as rounding explains from the result "
+                    "that follows from the previous iterate",
+                    after, substep + 1, name_of(found.part), whose, found.share);
 }
 
 // A backend that behaves otherwise when it is asked for iterates shows others than those of its frames.

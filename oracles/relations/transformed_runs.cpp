@@ -366,7 +366,7 @@ bool compare_runs(Verdict& verdict, const std::string& how, const TransformedRun
         return differ(witness_of({{}, {i}}, "particle {} is {} here and not in the other run", i,
                                  runs.original[p].alive[at(i)] ? "alive" : "dead"));
       }
-      vacuous(verdict, "which particles are removed is undecidable within rounding");
+      vacuous(verdict, "the removal of particles is inconclusive within rounding");
       return false;
     }
     if (expected.removed != actual.removed || expected.debris != actual.debris || expected.frame != actual.frame ||

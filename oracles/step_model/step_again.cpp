@@ -68,7 +68,7 @@ StepAgain step_again(const Setup& setup, const State& before, const State& after
   }
   if (!std::all_of(before.x.begin(), before.x.end(), is_finite) ||
       !std::all_of(before.v.begin(), before.v.end(), is_finite)) {
-    verdict.vacuous = "the step began with numbers that are none";
+    verdict.vacuous = "the step began with numbers that are not finite";
     return done();
   }
   StepAgain again;

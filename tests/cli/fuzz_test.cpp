@@ -185,7 +185,7 @@ TEST_F(Fuzz, PutsShardsTogetherToTheWhole) {
     }
   }
   // What was merged is no shard: an incomplete result would become a complete one.
-  expect_refused("fuzz --merge merged.json", {"merged.json", "put together already"});
+  expect_refused("fuzz --merge merged.json", {"merged.json", "merged already"});
   expect_refused("fuzz --merge 1.json 2.json 3.json --json nowhere/f.json", {"nowhere"});
 
   // A shard that failed makes the whole fail.

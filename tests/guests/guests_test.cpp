@@ -217,14 +217,14 @@ TEST(Guest, RefusesWhatIsNoPluginForIt) {
                        "it was made for version 99 of plugin.h, and this cutproof has 1"));
   EXPECT_TRUE(contains(problem_of_loading(plugin(PLUGIN_without_a_size)), "size is to be sizeof(cutproof_plugin)"));
   EXPECT_EQ(problem_of_loading(plugin(PLUGIN_in_c, "cannot")),
-            "skipped: its create() gave nothing: it cannot run here");
+            "skipped: its create() returned nothing: it cannot run here");
   EXPECT_EQ(problem_of_loading(plugin(PLUGIN_in_c)), "it loads");
 }
 
 TEST(Guest, SkipsAPluginForADeviceThatIsNotThere) {
   const std::string problem = problem_of_loading(plugin(PLUGIN_on_a_device));
   if (problem == "it loads") GTEST_SKIP() << "there is a CUDA device here";
-  EXPECT_TRUE(problem.starts_with("skipped: it wants a CUDA device")) << problem;
+  EXPECT_TRUE(problem.starts_with("skipped: it needs a CUDA device")) << problem;
 }
 
 // Made with a header that ended before `surface`: what lies beyond its size is not looked at, and what it has is
@@ -359,7 +359,7 @@ TEST(Questions, AreRefusedWithAnythingUnknown) {
   EXPECT_TRUE(is_no_whole_number([](json& j) { j["given"]["edge_ends"]["values"][0] = 3'000'000'000; }));
   EXPECT_TRUE(is_no_whole_number([](json& j) { j["seed"] = -1; }));
   EXPECT_TRUE(is_no_whole_number([](json& j) { j["index"] = 1e300; }));
-  EXPECT_TRUE(contains(problem([](json& j) { j = 5; }), "it is no question"));
+  EXPECT_TRUE(contains(problem([](json& j) { j = 5; }), "it is not a question"));
   EXPECT_TRUE(contains(problem([](json& j) { j["size"] = 70'000; }), "a question with a size has no arrays"));
   const auto problem_of_size = [&](const std::function<void(json&)>& change) {
     return problem([&](json& j) {
@@ -1314,7 +1314,7 @@ TEST_F(JudgeVerb, EndsWithTheStatusThatSaysWhatHappened) {
   EXPECT_EQ(run(std::string("judge ") + PLUGIN_in_c + " --save /dev/null/nowhere").status, 2);
   const Ran skipped = run(std::string("judge ") + PLUGIN_in_c + " --parameters cannot");
   EXPECT_EQ(skipped.status, 77);
-  EXPECT_EQ(skipped.output, "cutproof: skipped: its create() gave nothing: it cannot run here\n");
+  EXPECT_EQ(skipped.output, "cutproof: skipped: its create() returned nothing: it cannot run here\n");
   EXPECT_EQ(run(std::string("judge ") + PLUGIN_in_c + " components --parameters refuse --cases 60").status, 1);
 }
 

@@ -436,7 +436,7 @@ class OnTheDevice : public Libraries {
     const Outcome outcome = cutproof("judge " + plugin + " --cases 1");
     if (outcome.status != 77) return true;
     EXPECT_EQ(std::count(outcome.output.begin(), outcome.output.end(), '\n'), 1) << outcome.output;
-    EXPECT_NE(outcome.output.find("it wants a CUDA device"), std::string::npos) << outcome.output;
+    EXPECT_NE(outcome.output.find("it needs a CUDA device"), std::string::npos) << outcome.output;
     return false;
   }
 };

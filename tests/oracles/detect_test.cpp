@@ -506,11 +506,11 @@ TEST(Detection, OfAGeometricCutSaysHowNearTheBladeCame) {
     return detection(pair.setup, pair.before, after).witness.text;
   };
   EXPECT_EQ(text_of({17, 22}),
-            "particle 12 was not removed, but should have been: the nearest that the blade comes to it is 0.2 h, and "
-            "it takes what it comes within 0.5 h of");
+            "particle 12 was not removed, but should have been: the blade comes within 0.2 h of it, and "
+            "removes particles within 0.5 h");
   EXPECT_EQ(text_of({7, 12, 17, 22}),
-            "particle 7 was removed, but should not have been: the nearest that the blade comes to it is 1.0198 h, and "
-            "it takes what it comes within 0.5 h of");
+            "particle 7 was removed, but should not have been: the blade comes within 1.0198 h of it, and "
+            "removes particles within 0.5 h");
   // The same way, while it turns about its edge's axis by a little.
   for (auto& move : pair.setup.blade_moves) move.to.back = {std::sin(1e-4), 0, std::cos(1e-4)};
   EXPECT_NE(text_of({7, 12, 17, 22}).find("comes to it is 1.01"), std::string::npos) << text_of({7, 12, 17, 22});
