@@ -14,22 +14,21 @@
 
 namespace cutproof {
 
-// What the last call of run() did.
+// Results of the last call of run().
 struct SpanReport {
   std::array<bool, 6> ran = {};        // by stage: did any body launch it?
   double total_seconds = 0;            // wall time of the whole span [s]
   std::array<double, 6> seconds = {};  // by stage: wall time [s]; 0 where the span ran as one piece
 };
 
-// A backend does not take what it was given, and says why: nothing is known of it, so nothing is judged and nothing
-// passed.
+// A backend refuses its input and gives a reason. Nothing is judged, and nothing has passed.
 class Refused : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-// A member may throw MachineError or std::bad_alloc when the machine fails; after an exception a backend can only be
-// destroyed, or loaded anew.
+// A member may throw MachineError or std::bad_alloc when the machine fails. After an exception a backend can only be
+// destroyed or loaded again.
 class Backend {
  public:
   virtual ~Backend() = default;
@@ -40,25 +39,25 @@ class Backend {
   // Of its arithmetic. Its states say so too (State::precision).
   virtual Precision precision() const { return Precision::binary64; }
 
-  // Which contiguous runs of stages it can execute: perhaps every one, whole frames only, or a single stage. What it
-  // cannot run, others run for it, and it is not judged on that (harness/frame_runner.h).
+  // Which contiguous runs of stages the backend can execute: every one, whole frames only, or a single stage. The
+  // reference runs the other stages, for which the backend is not judged (harness/frame_runner.h).
   virtual bool can_run(Span span) const = 0;
 
   // Whether it knows Setup::withheld_iterations. Any other backend shows iterates substep by substep, each one loaded.
   virtual bool shows_iterates() const { return false; }
 
-  // What it vouches for, as words of harness/promises.h; "*": all that the rules of a setup promise.
+  // Promises of the backend, as words of harness/promises.h; "*": all promises of the rules of a setup.
   virtual std::string promises() const { return "*"; }
 
-  // Takes one or more bodies, each with its own parameters. Changes nothing in them: a state in the middle of a
-  // frame may be loaded. Requires setups.size() == states.size(). Throws std::invalid_argument if a state does not
-  // fit its setup, and Refused for what the backend does not do, such as bodies without a grid.
+  // Takes one or more bodies, each with its own parameters. Changes nothing in them: a state in the middle of a frame
+  // may be loaded. Requires setups.size() == states.size(). Throws std::invalid_argument if a state does not fit its
+  // setup. Throws Refused for unsupported inputs, such as bodies without a grid.
   virtual void load(std::vector<Setup> setups, std::vector<State> states) = 0;
 
-  // Executes the stages of `span` on every body whose schedule is not over. What a scene does not need is not
-  // launched: no blade and no other cause, no detect; nothing removed, no split, merge, expand, and no new cells of
-  // skin. A span that ends with skin ends the frame: numbers are compacted and state.frame counts up.
-  // The same state comes out whether a frame is run whole or span by span, bit for bit.
+  // Executes the stages of `span` on every body whose schedule is not over. A stage that a scene does not need is not
+  // launched: without a blade or another cause, no detect; without removals, no split, merge, expand or new cells of
+  // skin. A span that ends with skin ends the frame: numbers are compacted and state.frame counts up. A frame run whole
+  // and a frame run span by span give the same state, bit for bit.
   virtual void run(Span span) = 0;
 
   // A copy of every body's present state.

@@ -12,8 +12,8 @@
 
 namespace cutproof {
 
-// What is wrong with the edges of a bare graph, or "": offsets run from 0 to the number of ends, edges lead to
-// particles that are there, and each stands at both of its ends, once.
+// The first defect of the edges of a bare graph, or "". Offsets must run from 0 to the number of ends. Edges must lead
+// to existing particles. Each edge must be listed once at each of its ends.
 inline std::string problem_of_edges(const Body& body) {
   const std::vector<int64_t>& offsets = body.edge_offsets;
   const auto n = static_cast<int32_t>(body.rest.size());
@@ -51,8 +51,8 @@ inline std::string problem_of_edges(const Body& body) {
   return "";
 }
 
-// Gives a body whose particles are there these edges, which may stand at one end or both, and more than once. Requires
-// that they lead from particles to others.
+// Adds edges to a body that has its particles. An edge may be listed at one end or both, and repeatedly. Requires that
+// edges join different particles.
 inline void set_edges(Body& body, std::vector<std::pair<int32_t, int32_t>> edges) {
   for (std::size_t k = edges.size(); k-- > 0;) edges.emplace_back(edges[k].second, edges[k].first);
   std::sort(edges.begin(), edges.end());

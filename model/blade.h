@@ -27,8 +27,8 @@ struct BladePose {
   friend bool operator==(const BladePose&, const BladePose&) = default;
 };
 
-// What the blade does in one substep. Between `from` and `to` the middle of the edge moves on a straight line and
-// the orientation turns about one axis, both at a constant rate. Up (not down): it touches nothing.
+// Motion of the blade in one substep. Between `from` and `to` the middle of the edge moves on a straight line and the
+// orientation turns about one axis, both at a constant rate. A raised blade (not down) touches nothing.
 struct BladeMove {
   BladePose from, to;
   bool down = false;

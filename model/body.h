@@ -32,14 +32,14 @@ class Neighbours {
   std::size_t count_ = 0;
 };
 
-// In what part of a grid edge its crossing with the surface is told, and the least and the greatest there is: a vertex
-// on a node would make triangles without area.
+// Unit of a crossing along a grid edge, and the least and greatest crossing: a vertex on a node would make triangles
+// without area.
 inline constexpr int kCrossingSteps = 256, kLeastCrossing = kCrossingSteps / 16,
                      kGreatestCrossing = kCrossingSteps - kLeastCrossing;
 
 struct Body {
   std::string name;  // "kidney", or the mesh's file name
-  // Of a bare graph without nodes; the spacing is h all the same: its longest edge at rest, or what was given.
+  // Of a bare graph without nodes; the spacing is h all the same: the given one, or the longest edge at rest.
   Grid grid;
   std::vector<int64_t> node;  // [n] particle -> node, strictly ascending; no particle on the outer ring of nodes. Of a
                               // bare graph empty.
@@ -49,8 +49,8 @@ struct Body {
   std::vector<int64_t> edge_offsets;  // [n + 1] those of particle i: edge_ends[edge_offsets[i] .. edge_offsets[i + 1])
   std::vector<int32_t> edge_ends;     // their other ends: each edge at both of its ends, none twice, none to itself
   std::vector<double> mass;           // [n] m_i > 0 [kg]
-  // [6 n], or empty. Of a grid edge that leaves particle i for a node without a particle, where the body's surface
-  // crosses it: surface_crossing[6 i + direction] / 256 of h from i, within 1/16 and 15/16; 0: not known.
+  // [6 n], or empty. Crossing of the body's surface with a grid edge from particle i to a node without a particle. The
+  // distance from i is surface_crossing[6 i + direction] / 256 h, within 1/16 and 15/16; 0: not known.
   std::vector<uint8_t> surface_crossing;
   // Body frame to world: x_world = orientation · x + origin. Everything a backend sees is in the body frame,
   // so a body far from the world's origin computes with the same bits (method.md §1).

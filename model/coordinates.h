@@ -1,4 +1,4 @@
-// What is lost where places are kept as coordinates of the body's frame, and not as displacements from rest.
+// Loss of precision of coordinates in the body's frame, compared with displacements from rest.
 #pragma once
 #include <algorithm>
 
@@ -8,8 +8,8 @@
 
 namespace cutproof {
 
-// State::place_rounding of a state whose places were handed over, or kept, as such in its precision: u of the greatest
-// distance from the origin, at rest or now [m].
+// State::place_rounding of a state with such coordinates in its precision: u times the greatest distance from the
+// origin, at rest or deformed [m].
 inline double rounding_of_coordinates(const Body& body, const State& state) {
   double farthest = 0;
   for (int32_t i = 0; i < body.particle_count(); ++i) farthest = std::max(farthest, norm(body.rest_position(i)));

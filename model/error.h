@@ -8,9 +8,8 @@
 
 namespace cutproof {
 
-// Bad input or usage; the program ends with exit status 2. Names the file, the field in it, what is wrong
-// (with the value), and what would be right. All of these may quote what stands in files: what() is printable, of two
-// lines, and not as long as a file.
+// Bad input or usage; the program ends with exit status 2. Names the file, the field, the error (with the value) and
+// the remedy. All of these may quote files: what() is printable, of two lines, and of limited length.
 class InputError : public std::runtime_error {
  public:
   InputError(std::string file, std::string field, const std::string& problem, const std::string& remedy)

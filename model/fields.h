@@ -1,5 +1,5 @@
-// Every field of a State, described once: what compares, digests, records, corrupts or transforms states walks this
-// list and names no field by itself.
+// The list of all fields of a State. Code that compares, digests, records, corrupts or transforms states walks this
+// list and names no field.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace cutproof {
 
-// What the entries of a field are counted by.
+// The entities that a field has entries for.
 enum class IndexSpace {
   state,        // one value, or a list of its own length
   particle,     // [n]
@@ -24,10 +24,10 @@ enum class IndexSpace {
   triangle      // [t]
 };
 
-// What a value is, and so what becomes of it where the body is turned, shifted, scaled or numbered otherwise.
+// The kind of a value: how it changes where the body is turned, shifted, scaled or renumbered.
 enum class Quantity { number, particle, vertices, flag, mass, point, velocity, momentum, rotation, direction };
 
-// Groups of fields, as bits, that say what a verdict rests on.
+// Groups of fields, as bits: the input of a verdict.
 enum Part : unsigned {
   kMotion = 1,      // x, v, impulse
   kAlive = 2,       // alive
@@ -61,7 +61,7 @@ struct Field {
   Part part;
   StageSet changed_by;            // no other stage may change a bit of it
   std::string_view derived_from;  // "": it is not; else what determines it
-  // What two right backends must agree on: bits for decisions, distances for what is computed.
+  // Whether two correct backends must agree to the bit (decisions) or within a distance (computed values).
   bool is_decision;
 };
 

@@ -24,13 +24,13 @@ inline std::size_t edit_distance(std::string_view a, std::string_view b) {
   return row[b.size()];
 }
 
-// The known word that is nearest to what was given, the first of several; empty if none is near: if more than half of
-// it, and more than two letters, would have to be others. `known`: a range of things that are texts.
+// The first of the known words that are nearest to the given one. Empty if more than half of its letters, and more than
+// two, would have to change. `known`: a range of texts.
 template <class Words>
 std::string nearest_word(std::string_view given, const Words& known) {
   std::string nearest;
   std::size_t least = 0;
-  if (given.size() > 200) return nearest;  // nobody's slip
+  if (given.size() > 200) return nearest;  // no typing error
   for (const auto& each : known) {
     const std::string_view word(each);
     const std::size_t distance = edit_distance(given, word);

@@ -1,4 +1,4 @@
-// In what arithmetic numbers were computed. The bounds of the oracles follow from it (docs/design/tolerances.md).
+// Precision of an arithmetic. The bounds of the oracles follow from it (docs/design/tolerances.md).
 #pragma once
 
 namespace cutproof {

@@ -1,5 +1,5 @@
-// Text from outside, such as names of files and what stands in them, as it may be printed: nothing in it acts on a
-// terminal, turns the direction of reading round, begins a line of its own or is no UTF-8.
+// Makes text from outside, such as names and contents of files, printable. Printable text is UTF-8, has no line ends,
+// does not act on a terminal and does not change the direction of reading.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -42,8 +42,8 @@ inline bool is_utf8(std::string_view text) {
   return true;
 }
 
-// Control characters (C0, DEL, C1), marks and overrides of the direction of reading, separators of lines, and signs
-// that nobody sees.
+// Control characters (C0, DEL, C1), marks and overrides of the direction of reading, separators of lines, and invisible
+// characters.
 constexpr bool is_printable(uint32_t code) {
   const auto is_in = [code](uint32_t first, uint32_t last) { return code >= first && code <= last; };
   return !(code < 0x20 || is_in(0x7F, 0x9F) || code == 0xAD || code == 0x061C || code == 0x180E || code == 0x200B ||

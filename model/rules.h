@@ -1,4 +1,4 @@
-// Every choice that a scene makes by name, described once: its name in files, and what its answer promises.
+// All choices that a scene makes by name: the name in files, and the promises of the answer.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -46,7 +46,7 @@ constexpr std::optional<E> choice_named(std::string_view name) {
   return static_cast<E>(found - names.begin());
 }
 
-// What a rule of merging promises (method.md §6).
+// Promises of a rule of merging (method.md §6).
 struct MergePromise {
   bool unique;   // a function of the input alone: two right backends give the same clusters
   bool maximal;  // no small cluster is left that could still merge
@@ -56,7 +56,7 @@ constexpr MergePromise promise_of(MergeRule rule) {
   return {.unique = rule == none || rule == deterministic, .maximal = rule != none};
 }
 
-// What a rule of expansion promises (method.md §7).
+// Promises of a rule of expansion (method.md §7).
 struct ExpandPromise {
   bool covers_edges;  // I4 holds afterwards, so no tissue is uncoupled
   bool runs_always;   // in every frame that cuts; else only until I4 is known to hold
@@ -65,7 +65,7 @@ constexpr ExpandPromise promise_of(ExpandRule rule) {
   return {.covers_edges = rule == ExpandRule::edge_cover, .runs_always = rule == ExpandRule::published};
 }
 
-// What a criterion promises (method.md §4).
+// Promises of a criterion (method.md §4).
 struct CriterionPromise {
   bool keeps_blade_out;  // no tissue stands across the blade
 };
@@ -73,7 +73,7 @@ constexpr CriterionPromise promise_of(Criterion criterion) {
   return {.keeps_blade_out = criterion == Criterion::distance};
 }
 
-// What a rule of which ends go promises (method.md §4).
+// Promises of a rule of removed ends (method.md §4).
 struct RemovePromise {
   bool order_independent;  // with particles in another order the answer is the same
 };

@@ -1,6 +1,6 @@
-// A scene as a person writes it: a body, how it is simulated, what is done to it, and what must come out. Free of
-// any particular resolution: the same scene runs on any organ. Field by field documentation with unit, default and
-// bounds is generated from the reader: docs/reference/scene.md.
+// A scene as a person writes it: a body, parameters of the simulation, the path of a blade, and expectations. A scene
+// depends on no resolution and runs on any organ. Field by field documentation with unit, default and bounds is
+// generated from the reader: docs/reference/scene.md.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -28,14 +28,14 @@ struct Shape {
   friend bool operator==(const Shape&, const Shape&) = default;
 };
 
-// Of the volume: beyond this change, as a share of the greater of what was there and is then, a repaired mesh is
-// another body. Where it is a ball, its surface has moved by half a spacing at 100,000 particles.
+// Greatest change of volume by repair, as a share of the greater of both volumes. For a ball of 100,000 particles, this
+// change moves the surface by half a spacing.
 inline constexpr double kMostRepairChange = 0.05;
 
 struct MeshSpec {
   std::string file;                          // as written in the scene; relative to the scene's file
   double unit = 0;                           // metres per unit of the file's numbers: 1e-3 for mm. Must be given.
-  bool repair = false;                       // what keeps it from bounding a solid
+  bool repair = false;                       // repair a surface that bounds no solid
   double repair_change = kMostRepairChange;  // the mesh is refused if repair changes the volume by more; 1: never
   friend bool operator==(const MeshSpec&, const MeshSpec&) = default;
 };
@@ -56,7 +56,7 @@ enum class Cooking { boxes, sampled };
 struct ClusterSpec {
   Cooking method = Cooking::boxes;
   int32_t side = 5;      // boxes: c, nodes per side of a core
-  double spacing = 3.0;  // sampled: least distance of a new seed from what is covered [h]
+  double spacing = 3.0;  // sampled: distance within which a seed covers particles [h]
   double radius = 4.0;   // sampled: radius of the balls [h]
   double small = 0.5;    // tau = small · median size at cooking
   double cap = 1.4;      // cap = cap · largest size at cooking
@@ -64,7 +64,7 @@ struct ClusterSpec {
 };
 
 // Points of paths and regions are in box coordinates: (0,0,0) is the lower, (1,1,1) the upper corner of the bounding
-// box of the body's particles (half a spacing beyond the outermost), after alignment. They may lie outside.
+// box of the body's particles (half a spacing beyond the outermost), after alignment. Points may lie outside.
 enum class Curve { line, arc };  // line: polyline through the points; arc: the circle through three points
 struct StrokeSpec {
   Curve curve = Curve::line;
@@ -103,7 +103,7 @@ struct GripSpec {
   friend bool operator==(const GripSpec&, const GripSpec&) = default;
 };
 
-// What `cutproof run --check` enforces. Absent: not enforced.
+// Expectations that `cutproof run --check` enforces. Absent: not enforced.
 struct Range {
   double low = 0, high = 0;  // both included
   friend bool operator==(const Range&, const Range&) = default;
@@ -125,8 +125,8 @@ struct Expectations {
 // Of the format: a reader refuses any other.
 inline constexpr int32_t kSceneVersion = 5;
 
-// How often the scene's frames detect. substep: each frame is laid out as as many frames of one substep, in all of
-// which every stage runs: what a blade has parted goes at the end of that substep, and not of up to S of them.
+// How often detection runs. substep: each frame of S substeps is laid out as S frames of one substep, in all of which
+// every stage runs. Removal then follows a cut within one substep, not within S.
 enum class DetectEvery { frame, substep };
 
 struct Scene {

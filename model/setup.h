@@ -1,6 +1,5 @@
-// All that stays constant while one body is simulated: the body, the parameters of the six stages, and what the
-// outside world does in each substep. Paths are resolved to tables, so that a backend looks them up and two
-// backends cannot disagree about kinematics.
+// All constants of the simulation of one body: the body, the parameters of the six stages, and the contacts and grips
+// of each substep. Paths are resolved to tables, so that two backends cannot disagree about kinematics.
 #pragma once
 #include <algorithm>
 #include <cstdint>
@@ -42,11 +41,10 @@ struct DetectParameters {
 };
 
 // With RemovedEnds::nearer the end on the positive side goes if it is nearer to the blade's plane by more than this
-// [h]: where both are equally near, which is where blades are set between two layers, the negative side goes as a
-// whole.
+// [h]. Where a blade lies halfway between two layers, both ends are equally near, and the whole negative layer goes.
 inline constexpr double kNearerBy = 0.125;
 
-// Nothing is ever removed: with what that leaves without a meaning as it is by default.
+// Switches removal off, and sets parameters without a meaning to their defaults.
 inline void remove_nothing(DetectParameters& detect) {
   detect.criterion = Criterion::none;
   detect.remove = RemovedEnds::both;
@@ -84,15 +82,15 @@ struct Wall {
   friend bool operator==(const Wall&, const Wall&) = default;
 };
 
-// A particle that is nearer than this to where it would touch a contact counts as touching in an accelerated iteration
-// (method.md §11) [h]: one that lies on a wall exactly must not do one thing or another as rounding has it.
+// A particle nearer than this to a contact counts as touching in an accelerated iteration (method.md §11) [h]. Rounding
+// must not decide for a particle that lies exactly on a wall.
 inline constexpr double kTouchMargin = 0x1p-10;
 
 // Where blade and walls are projected in turn, a place is refused if it is worse than the present one by more than this
-// many roundings of what is compared and of the present place (method.md §3).
+// many roundings of the compared distance and of the present place (method.md §3).
 inline constexpr double kRefusalRoundings = 64;
 
-// Whether two walls face each other with no room between them: then nothing is allowed anywhere.
+// Whether two walls face each other with no room between them: then no place is allowed.
 inline bool leave_no_room(const Wall& a, const Wall& b) {
   return a.axis == b.axis && a.side != b.side && a.side * (b.offset - a.offset) <= 0;
 }
@@ -121,7 +119,7 @@ struct Setup {
   // the blade would be too fast is already divided into equal frames here (method.md §3, Blade).
   std::vector<double> substep_length;  // [frames] dt [s], > 0
   std::vector<BladeMove> blade_moves;  // [frames · S], empty if there is no blade
-  std::vector<int64_t> stroke_end;     // [strokes] frame at whose end the stroke is complete; -1: the run ends before
+  std::vector<int64_t> stroke_end;     // [strokes] frame that completes the stroke; -1: the run ends earlier
 
   // Iterations that the last substep of each frame leaves out, 0 .. iterations. No scene does: so a backend can be
   // asked for every iterate of a frame (oracles/iterates/).
@@ -136,7 +134,7 @@ inline double uncut_reach(const Setup& setup, int32_t owner, int direction) {
   return crossing > 0 ? crossing : setup.skin.alpha;
 }
 
-// The same for all vertices of a skin, which may name what is not there: such a vertex has alpha.
+// The same for all vertices of a skin. A vertex with an invalid owner or direction has alpha.
 inline std::vector<double> uncut_reaches(const Setup& setup, const Skin& skin) {
   std::vector<double> reaches(skin.owner.size(), setup.skin.alpha);
   for (std::size_t v = 0; v < std::min(skin.owner.size(), skin.direction.size()); ++v) {
@@ -157,8 +155,8 @@ inline double blade_clearance(const Setup& setup) {
   return 1.001 * (setup.blade.thickness > reach ? setup.blade.thickness : reach) / 2;
 }
 
-// The blade where it stands last in a frame while it is lowered; null if it never is, or if the schedule is over. For
-// those who judge: a backend has its own.
+// The last pose of the lowered blade in a frame; null if the blade is never lowered, or if the schedule is over. For
+// oracles: backends have their own.
 inline const BladePose* last_lowered(const Setup& setup, int64_t frame) {
   const int64_t substeps = setup.step.substeps;
   if (!setup.has_blade || frame >= setup.frame_count()) return nullptr;

@@ -1,5 +1,5 @@
-// Every field of a Setup, described once: what records, checks, compares or writes setups walks this list and names no
-// field by itself. model/fields.h does the same for a State.
+// The list of all fields of a Setup. Code that records, checks, compares or writes setups walks this list and names no
+// field. model/fields.h does the same for a State.
 #pragma once
 #include <limits>
 #include <string_view>
@@ -11,7 +11,7 @@
 
 namespace cutproof {
 
-// What the entries of a field are counted by.
+// The entities that a field has entries for.
 enum class SetupSpace {
   one,            // one value
   node,           // [nodes of the grid]

@@ -21,7 +21,7 @@ struct State {
   int32_t tau = 0;            // a cluster with fewer particles is small (method.md §6)
   int32_t cap = 0;            // most particles of a merged cluster
   bool edge_covered = false;  // I4 is known to hold, so no expansion stage is needed (method.md §7)
-  Vec3 impulse;               // what contacts, pins and grips gave in this frame, damped as v is [kg m/s]
+  Vec3 impulse;               // impulse of contacts, pins and grips in this frame, damped as v is [kg m/s]
   Skin skin;
   // The coarsest arithmetic in which any part of this was computed: a backend makes it coarser where its own is, and
   // never finer.

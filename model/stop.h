@@ -1,14 +1,13 @@
-// How work that takes long learns that it is to stop, and how it then ends. Who asks, and why, is not its business.
+// How long work is asked to stop, and how it ends.
 #pragma once
 #include <functional>
 
 namespace cutproof {
 
-// Asked between pieces of work, from any thread; empty: nobody will ask. Once true, it stays true.
+// Called between pieces of work, from any thread; empty: the work is never stopped. Once true, the answer stays true.
 using StopAsked = std::function<bool()>;
 
-// Thrown through work that was asked to stop, to whoever asked. No std::exception: it is no fault, and nothing that
-// catches faults is to take it for one.
+// Thrown through work that was asked to stop. Not a std::exception, so that handlers of faults do not catch it.
 class Stopped {};
 
 inline bool is_asked(const StopAsked& stop_asked) { return stop_asked && stop_asked(); }

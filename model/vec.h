@@ -1,5 +1,5 @@
-// Three-vectors and 3 × 3 matrices as plain data. model/ depends on nothing, so these carry only the
-// arithmetic that every folder needs to read a state; linear algebra proper is Eigen's, where it is used.
+// Three-vectors and 3 × 3 matrices as plain data. model/ depends on no library, so this file has only the arithmetic
+// that every folder needs. Folders that need more linear algebra use Eigen.
 #pragma once
 #include <array>
 #include <cmath>

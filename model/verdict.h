@@ -1,4 +1,4 @@
-// What an oracle says of a state (docs/reference/oracles.md). A wrong simulation is a failing verdict, never an
+// The judgement of an oracle on a state (docs/reference/oracles.md). A wrong simulation is a failing verdict, never an
 // exception.
 #pragma once
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace cutproof {
 
-// A skin that is torn open has a defect at every second triangle, and nobody looks at each of them.
+// A torn skin has a defect at every second triangle; a few of them suffice.
 inline constexpr int32_t kMostWitnessTriangles = 100;
 
 // The smallest thing that shows the failure.
@@ -25,7 +25,7 @@ struct Witness {
   friend bool operator==(const Witness&, const Witness&) = default;
 };
 
-// Wall time [s] of judging, which says nothing of what was judged: any two are equal.
+// Wall time [s] of judging. Times do not count in comparisons of verdicts: any two are equal.
 struct JudgingTime {
   double seconds = 0;
   friend bool operator==(JudgingTime, JudgingTime) { return true; }
@@ -51,8 +51,8 @@ struct Verdict {
   friend bool operator==(const Verdict&, const Verdict&) = default;
 };
 
-// How the witness begins of a verdict that could not be made because what it would rest on is broken. Such a verdict
-// fails; what it measured, and its bound, mean nothing.
+// Beginning of the witness of a verdict that could not be made because its input is broken. Such a verdict fails; its
+// measured value and bound mean nothing.
 inline constexpr std::string_view kNotJudged = "could not be judged";
 inline bool could_be_judged(std::string_view witness) { return !witness.starts_with(kNotJudged); }
 inline bool was_judged(const Verdict& verdict) { return verdict.holds || could_be_judged(verdict.witness.text); }
