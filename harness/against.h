@@ -20,7 +20,7 @@ struct Against {
 
   // Parameters as the two classes have them.
   Against(const Setup& setup, const State& start, const State& loaded, const std::string& backend, AgainstMode mode);
-  // From now on: told the reference's states, of lockstep where that was asked for, else of the free run.
+  // Registers a listener of the reference's states: of lockstep if requested, else of the free run.
   void observe_reference(std::function<void(Stage, const State&)> observer);
   // `by_backend`: false of a stage that the reference ran for the backend, which is not compared.
   void see(Stage stage, const State& after, bool launched, bool by_backend = true);

@@ -1,5 +1,5 @@
-// Every backend described once: what it is called, what it can do, how it is made. Verbs, benchmarks, property tests
-// and help texts follow from these descriptions and compare no names.
+// The list of all backends: name, abilities and factory. Subcommands, benchmarks, property tests and help texts use
+// these descriptions and compare no names.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -14,7 +14,7 @@
 
 namespace cutproof::harness {
 
-// What a verb takes if no backend is named: the reference, or the kernels on this machine's CPU.
+// The default backend of a subcommand: the reference, or the kernels on this machine's CPU.
 inline constexpr const char* kReferenceName = "reference";
 inline constexpr const char* kHostName = "host";
 
@@ -35,18 +35,17 @@ struct BackendDescriptor {
   // All others are compared with it; it is not compared with itself.
   bool is_the_reference = false;
   Processor processor = Processor::one_thread;
-  bool is_timed = true;          // else it only finds faults: what it takes says nothing
-  bool is_another_path = false;  // another backend, whose kernels are started in another way, with the same bits
+  bool is_timed = true;          // else the backend only finds faults: its times mean nothing
+  bool is_another_path = false;  // another backend that starts these kernels in another way, with the same bits
   bool pipelines = false;        // run() does not wait: frames can be handed over back to back
   bool runs_kernels = true;
   bool takes_schedule = false;  // --schedule, --schedule-seed: its interleaving is chosen and can be replayed
 
-  // Benchmarks: whether bodies are as large as the paper's unless somebody asks for others, and how many frames are
-  // timed.
+  // Benchmarks: whether bodies have the paper's sizes by default, and the number of timed frames.
   bool takes_full_size = false;
   int64_t timed_frames = 10;
-  // Campaigns: how many bodies one load has at least, and particles, if that takes more bodies (0: that is the same);
-  // how many loads at once keep it, or one of its devices, busy (0: as many as there are threads).
+  // Campaigns: least number of bodies in a batch, and of particles, if that takes more bodies (0: no limit); number of
+  // concurrent batches that keep the backend, or one of its devices, busy (0: one for each thread).
   int bodies_in_a_load = 64;
   int64_t particles_in_a_load = 0;
   int most_parallel_loads = 0;
@@ -73,22 +72,22 @@ std::string backend_names(const std::function<bool(const BackendDescriptor&)>& w
 std::string description_of(const BackendDescriptor& backend);
 // The processor and how many of its threads work, or the CUDA device; empty if that is not there.
 std::string processor_of(const BackendDescriptor& backend, int device = 0);
-// What --devices says, "0,2" or "all"; empty: the first. Of a backend that needs none a list of one, which is nobody's
-// device. Throws InputError, naming --devices, for what is no list, for a device that is not there or is named twice,
-// and if a backend that needs none is given any.
+// Devices named by --devices, "0,2" or "all"; empty: the first. A backend without devices has a list of one
+// placeholder. Throws InputError, naming --devices, for a malformed list, for a device that does not exist or is named
+// twice, and for devices of a backend that has none.
 std::vector<int> devices_of(const std::string& text, const BackendDescriptor& backend);
 
-// Throws InputError, naming the option, for what does not exist or is not in this build; MachineError if there is no
-// device.
+// Throws InputError, naming the option, for a backend that does not exist or is not in this build; MachineError if
+// there is no device.
 std::unique_ptr<Backend> make_backend(const BackendChoice& choice);
-// The same, whose schedule is written down as it is made (architecture.md, Schedules). Requires a backend that takes
-// a schedule.
+// The same, with a record of the schedule's decisions (architecture.md, Schedules). Requires a backend that takes a
+// schedule.
 std::unique_ptr<Backend> make_recorded_backend(const BackendChoice& choice,
                                                std::shared_ptr<gpu::ThreadSchedule> record);
 std::unique_ptr<Backend> make_replaying_backend(gpu::ThreadSchedule schedule);
 
-// For one of many loads that run beside each other: each has a schedule of its own, whose kinds take turns; and one
-// thread, because there are as many loads as threads.
+// For one of many concurrent batches. Each batch has its own schedule, whose kinds alternate, and one thread, because
+// there are as many batches as threads.
 BackendChoice choice_for_load(BackendChoice choice, int64_t load);
 
 const std::vector<std::string>& schedule_names();

@@ -1,5 +1,5 @@
-// A cut of which only the end is known, as one piece: what the reference makes of the same removal, and where the
-// clusters at its end have their rotations from.
+// A cut of which only the final state is known: the reference's answer to the same removal, and the origins of the
+// rotations of the final clusters.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -12,8 +12,8 @@
 namespace cutproof::harness {
 
 // [clusters] Which clusters before the cut (by their places, ascending) a cluster at its end may have its rotation
-// from: one where that is known, none where the cluster is not among the answers. A split hands a rotation on to all
-// pieces, and a union has that of the cluster whose number it keeps (method.md §5, §6).
+// from: one if known, none if the cluster is not among the answers. All pieces of a split inherit its rotation; a union
+// has the rotation of the cluster whose number it keeps (method.md §5, §6).
 using Origins = std::vector<std::vector<int32_t>>;
 
 struct CutAgain {
@@ -23,10 +23,10 @@ struct CutAgain {
 // The reference's split of a state after detection, and the stages after it up to `last`.
 CutAgain cut_again(const Setup& setup, const State& detected, Stage last);
 
-// Of somebody else's `end` of the same stages. `expected`: the reference's answer to them. Where the rule of merging
-// leaves several answers an origin follows from numbers as long as these are kept, up to skin. Later a cluster comes
-// from one of the pieces that it contains: from one that is not small and lies in no other, if there is one, because
-// such a piece never gives its number up; and so that numbers ascend, because clusters keep their order.
+// Origins for another simulator's `end` of the same stages. `expected`: the reference's answer. Where the rule of
+// merging leaves several answers, an origin follows from numbers as long as these are kept, up to skin. Later a cluster
+// comes from one of the pieces that it contains. A piece that is not small and lies in no other keeps its number, so
+// such a piece is the origin, if there is one. Numbers ascend, because clusters keep their order.
 Origins origins_of(const Setup& setup, const State& detected, Stage last, const CutAgain& expected, const State& end);
 
 // Gives the clusters before the cut the rotations and flags that those of `end` have from them, as far as that is

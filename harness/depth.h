@@ -9,7 +9,7 @@
 namespace cutproof::harness {
 
 enum class Depth {
-  topology,  // what follows from the states alone: the cheap one
+  topology,  // properties that follow from states alone: cheap
   motion     // everything: also every step, and of a backend that can be run again, relations between its runs
 };
 inline constexpr std::array<std::string_view, 2> kDepthNames = {"topology", "motion"};

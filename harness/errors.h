@@ -64,13 +64,13 @@ class Errors {
   bool wants(int64_t frame) const;
   void frame_begins(const State& state);
   void frame_ends(const State& state);
-  // After the last frame: what takes runs of its own.
+  // After the last frame: measurements that need further runs.
   void finish(const State& end);
 
-  // Whether what has a bound is within it: conservation.
+  // Whether all measurements with a bound (conservation) are within it.
   bool holds() const;
 
-  // What was measured. What was not wanted, or what this run has not, is empty.
+  // The measurements. Those that were not requested, or that this run does not have, are empty.
   const ErrorsWanted& wanted() const { return wanted_; }
   Precision precision() const { return precision_; }  // which bound of momentum holds
   const std::vector<Solver>& solver() const { return solver_; }

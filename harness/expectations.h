@@ -1,4 +1,4 @@
-// What a scene expects of its run (model/scene.h, Expectations), held against the run.
+// Compares a run with its scene's expectations (model/scene.h, Expectations).
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -29,16 +29,16 @@ class ExpectationCheck {
   void see(const Moment& moment);
 
   struct Judged {
-    // One for each thing that is expected, with the stage and the frame in which it went wrong: the first in which too
-    // much was seen, the last if there was too little. Of a run that is cut short only for what can be told: strokes
-    // that are complete, what cannot change any more, and what is too much already.
+    // One verdict for each expectation, with the stage and frame of its failure: the first frame with too much, or the
+    // last frame if there was too little. A run that ends early has verdicts only where the outcome is certain:
+    // complete strokes, final values, and exceeded limits.
     std::vector<Verdict> verdicts;
-    // The rest of what is expected, which such a run has not reached.
+    // The other expectations, which such a run has not reached.
     std::vector<std::string> not_reached;
-    // What is decided by stages of which the backend ran none: the reference's outcome, held against nobody.
+    // Expectations that depend only on stages that the reference ran for the backend: not judged.
     std::vector<std::string> not_its_own;
   };
-  // After the last moment. `stages`: who ran them.
+  // After the last moment. `stages`: which of them the backend ran.
   Judged judged(const StagesRun& stages) const;
 
   // Whether the scene expects anything at all.

@@ -1,5 +1,5 @@
-// Judges one state that somebody else's simulator wrote, by the registry of properties. What the file leaves out, what
-// its author does not promise and what a single state cannot show is not judged, and is named.
+// Judges one state of another simulator by the registry of properties. A property is named as not judged if the file
+// lacks its arrays, if it is not promised, or if a single state cannot show it.
 #pragma once
 #include <optional>
 #include <string>
@@ -17,7 +17,7 @@ struct NotJudged {
 struct ForeignVerdicts {
   std::vector<Verdict> verdicts;
   std::vector<NotJudged> not_judged;  // in the order of the registry
-  std::vector<std::string> notes;     // what a reader of the verdicts has to know, one sentence each
+  std::vector<std::string> notes;     // notes for the reader of the verdicts, one sentence each
   // How many pieces the living tissue is in, and in words; nothing of a state that is not well formed.
   std::optional<int64_t> pieces;
   std::string pieces_in_words;
@@ -27,7 +27,8 @@ struct ForeignVerdicts {
   bool holds() const;
 };
 
-// "skin surface" of a skin whose vertices have no owners: closed, oriented, 2-manifold; and there, if any tissue is.
+// "skin surface" of a skin whose vertices have no owners: closed, oriented, 2-manifold, and not empty if there is
+// tissue.
 Verdict closed_skin(const Skin& skin, bool any_alive);
 
 ForeignVerdicts judge_foreign_state(const ForeignState& foreign);

@@ -1,4 +1,4 @@
-// A run of somebody else's simulator, from named arrays, segment by segment (docs/reference/run.md).
+// A run of another simulator, from named arrays, segment by segment (docs/reference/run.md).
 #pragma once
 #include <functional>
 #include <set>

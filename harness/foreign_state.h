@@ -1,4 +1,4 @@
-// One state that somebody else's simulator wrote, from named arrays (docs/reference/state.md).
+// One state of another simulator, from named arrays (docs/reference/state.md).
 #pragma once
 #include <optional>
 #include <set>
@@ -15,7 +15,7 @@ namespace cutproof::harness {
 struct ForeignState {
   Setup setup;  // of the body alone: no schedule, no contacts, no rules of its own
   State state;
-  // Why no State could be made of the values, or "": the arrays could be read, and what they say is not a state.
+  // The reason why the values of readable arrays are not a State, or "".
   std::string defect;
   std::set<std::string, std::less<>> given;  // names of the arrays that are there
   Promises promises;
@@ -27,20 +27,19 @@ struct ForeignState {
   // share out to that.
   bool plain_weights = false;
   std::optional<int64_t> pieces;   // how many the tissue is said to be in
-  std::vector<std::string> notes;  // on what was passed over, or read as something else
+  std::vector<std::string> notes;  // on ignored or converted arrays
 };
 
-// What a file may hold. Of texts: `promises` and `weights`.
+// Arrays that a file may contain. Texts: `promises` and `weights`.
 const std::vector<KnownArray>& foreign_state_arrays();
 const std::vector<KnownArray>& foreign_state_texts();
 
-// Shapes, types and names are the file's: where one is wrong the file cannot be understood, and an InputError says so.
-// Values are the state's: where one is wrong (an index out of range, offsets that descend) the state is not well
-// formed, and the judge says so. The exceptions are single numbers (spacing, tau, cap, alpha), which ask a question of
-// the state, and a `rest` that contradicts the grid: InputError.
+// A wrong shape, type or name makes the file unreadable: InputError. A wrong value (an index out of range, offsets that
+// descend) makes the state not well formed: a verdict. The exceptions are single numbers (spacing, tau, cap, alpha),
+// which are parameters of the judgement, and a `rest` that contradicts the grid: InputError.
 //
-// Members are sorted, `removed` is, clusters are put into the order of their numbers, and each edge is put at both of
-// its ends, so that none of that is demanded.
+// Members and `removed` are sorted, clusters are put into the order of their numbers, and each edge is listed at both
+// ends, so files need none of this.
 ForeignState foreign_state_of(const io::ArrayFile& contents, const std::string& file);
 
 }  // namespace cutproof::harness

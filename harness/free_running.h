@@ -27,9 +27,10 @@ struct FirstDifference {
   int64_t frame = 0;
   Stage stage = Stage::step;
   oracles::DecisionDifference what;
-  // Distance criterion, removals: of the particles that only one of them removed the one whose removal is farthest from
-  // being another, in the reference's positions: |d_i - εh| / h, or of one end of each edge the least such distance of
-  // an edge or of a side of the blade's plane; and by how much that may differ, given how far the positions are apart.
+  // Distance criterion, removals: the greatest margin of a particle that only one run removed, in the reference's
+  // positions. The margin is |d_i - εh| / h. If one end of each edge is removed, the margin is the least such distance
+  // of an edge or of a side of the blade's plane. Second, the possible difference of the margin, given the distance of
+  // the positions.
   std::optional<double> margin;
   double reach = 0;  // [h]
   // Both may be right: the backend's removals are those that its own positions ask for and the margin is within reach,
@@ -42,7 +43,7 @@ class FreeRunning {
   // `start` is what was loaded, `loaded` the backend's first snapshot. `setup` must outlive this.
   FreeRunning(const Setup& setup, const State& start, const State& loaded, std::string backend);
 
-  // From now on: told the reference's state after each stage that it ran, up to the first decision that differs.
+  // Registers a listener of the reference's state after each stage, up to the first decision that differs.
   void observe_reference(std::function<void(Stage, const State&)> observer) { observer_ = std::move(observer); }
 
   // The backend's state after `stage`, of every stage of every frame, in order. A state that is not well formed is a

@@ -1,5 +1,5 @@
-// The judge of a run: puts every property that applies to each moment of one body. Whoever looks at a run, live or
-// recorded, scene or random case, has it judged here.
+// The judge of a run: checks every applicable property at each moment of one body. All runs, live or recorded, scene or
+// random case, are judged here.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -24,16 +24,15 @@ enum class Thorough {
 
 class Judge {
  public:
-  // `setup` must outlive this. `backend` is the name that verdicts carry. Who says nothing about the depth judges by
-  // everything.
+  // `setup` must outlive this. `backend` is the name in verdicts. The default depth judges every property.
   Judge(const Setup& setup, std::string backend, Promises promises, Thorough thorough, Depth depth = Depth::motion);
   ~Judge();
 
   // The state as loaded. `has_expanded`: an expansion may have changed its clusters already.
   void begin(const Snapshot& initial, bool has_expanded = false);
-  // Moments in order. What somebody else ran for the backend is not judged.
+  // Moments in order. Stages that the reference ran for the backend are not judged.
   void see(const Moment& moment);
-  // A verdict of somebody else's on this run, such as a broken contract. One that is not promised is left out.
+  // Adds another verdict on this run, such as a broken contract. A verdict that is not promised is left out.
   void add(Verdict verdict);
 
   const std::vector<Verdict>& verdicts() const { return verdicts_; }
@@ -48,7 +47,7 @@ class Judge {
   bool has_expanded() const { return has_expanded_; }
   int64_t frame() const { return frame_; }  // in progress
 
-  // For reports, computed from what is known already. Of the last state seen, 0 if that is not well formed.
+  // For reports, from results that are known already. Of the last state seen, 0 if that is not well formed.
   int32_t component_count();
   int32_t inner_shells();
 
@@ -68,7 +67,7 @@ class Judge {
   oracles::Judge judge_;
   std::vector<Verdict> verdicts_;
   std::vector<Unpromised> unpromised_;
-  std::vector<Snapshot> kept_;  // what judge_ may still look at
+  std::vector<Snapshot> kept_;  // input of judge_
   Snapshot last_;
   int64_t frame_ = 0;
   bool has_expanded_ = false;
@@ -76,8 +75,8 @@ class Judge {
   bool lost_ = false;         // the last state is not well formed, so the next one cannot be compared with it
 };
 
-// A span that begins with step and shows only its end: what step left, as far as no later stage may have touched it. Of
-// the rest nothing is assumed (the state before stands in for it).
+// For a span that begins with step and shows only its end: the fields after step that no later stage may change. The
+// other fields are those of the state before.
 State after_step(const State& before, const State& end);
 
 }  // namespace cutproof::harness

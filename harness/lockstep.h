@@ -1,6 +1,6 @@
 // A backend's run beside the reference, in lockstep: before each stage the reference takes the backend's state, then
-// both run the stage (measure_and_tune.md, Implementation). What is measured is the error of one frame, and a decision
-// that falls within its rounding band does not spread to the next stage.
+// both run the stage (measure_and_tune.md, Implementation). Errors are those of one frame, and a decision within its
+// rounding band does not spread to the next stage.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -23,7 +23,7 @@ struct LockstepFrame {
   int64_t frame = 0;
   oracles::ErrorNorm angle;                  // of rotations [rad]
   std::array<oracles::ErrorNorm, 6> errors;  // by Measure; rest frames only if clusters have changed
-  int64_t topology_differences = 0;          // stages that differ in what must be equal
+  int64_t topology_differences = 0;          // stages with different decisions
   oracles::Undecidable undecidable;
 
   oracles::ErrorNorm& error(oracles::Measure which) { return errors[at(which)]; }
@@ -48,7 +48,7 @@ class Lockstep {
   // reference ran for the backend: it is passed over.
   void see(Stage stage, const State& after, bool launched, bool by_backend = true);
 
-  // From now on: told what the reference has made of the backend's state, of every stage that the backend launched.
+  // Registers a listener of the reference's answers to the backend's states, for every stage that the backend launched.
   void observe_reference(std::function<void(Stage, const State&)> observer) { observer_ = std::move(observer); }
 
   // One verdict for each thing that was measured, over the whole run so far (json.md, Comparison with the
@@ -59,7 +59,7 @@ class Lockstep {
   const LockstepWorst& worst(oracles::Measure which) const { return tracks_[at(which)].worst; }
 
  private:
-  // What one verdict is made from, but for how much was checked.
+  // Data of one verdict, except the number of checks.
   struct Failures {
     Verdict first;
     int64_t count = 0;

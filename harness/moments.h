@@ -1,5 +1,5 @@
-// A run as those see it who look at it: a sequence of moments, each the state of one body before and after a span of
-// stages, whoever ran them and whether they run now or were recorded.
+// A run as observers see it: a sequence of moments. A moment is the state of one body before and after a span of
+// stages, run by the backend or the reference, live or recorded.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -15,22 +15,21 @@
 
 namespace cutproof::harness {
 
-// A moment begins with the state in which the one before ended, as whoever runs it holds it: loaded into single
-// precision it may have been rounded.
+// A moment begins with the last state of the previous moment; loading into single precision may have rounded it.
 //
-// A state that nobody changes any more; whoever wants to keep it keeps the pointer.
+// An immutable state; the pointer keeps it alive.
 using Snapshot = std::shared_ptr<const State>;
 
 struct Moment {
   int32_t body = 0;
   Span span;
   Snapshot before, after;
-  // False: the backend cannot run these stages, so the reference ran them for it, and they are nobody's to be judged.
+  // False: the backend cannot run these stages. The reference ran them, and they are not judged.
   bool by_backend = true;
 };
 using Observer = std::function<void(const Moment&)>;
 
-// One body's run: the state as loaded, and what came of it.
+// One body's run: the state as loaded, and the moments.
 struct Trace {
   Snapshot initial;
   std::vector<Moment> moments;
@@ -40,8 +39,8 @@ struct Trace {
 // for what was removed in it). The skin stage ends the frame whether a skin is wanted or not.
 std::array<bool, 6> due_stages(const Setup& setup, const State& before, Span span, const State& after);
 
-// Who ran the stages that were due: of each stage in how many moments the backend did, and in how many the reference
-// did it for a backend that cannot.
+// Runs of due stages: for each stage, the number of moments in which the backend ran it, and in which the reference ran
+// it for the backend.
 struct StagesRun {
   std::array<int64_t, 6> by_backend = {}, by_reference = {};
 
@@ -57,7 +56,7 @@ struct StagesRun {
 // A failing verdict: something that model/backend.h promises does not hold.
 Verdict broken_contract(std::string what, Stage stage, int64_t frame, int32_t body = 0);
 
-// What one frame did, over all bodies.
+// Stages that one frame ran, over all bodies.
 struct FrameResult {
   int64_t frame = 0;
   std::array<bool, 6> ran = {};        // by stage

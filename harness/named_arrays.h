@@ -1,6 +1,6 @@
-// Named arrays of a file that somebody else wrote, taken out one by one: each is there or not, has the shape and the
-// kind of numbers that it should have, and no name is unknown. Whatever is not so is an InputError. What MATLAB and
-// numpy do by themselves is no error: a list as a matrix of one row or one column, and an empty list without a type.
+// Named arrays of a file from another program, read one by one. A wrong shape, a wrong kind of number and an unknown
+// name are InputErrors. Habits of MATLAB and numpy are no errors: a list as a matrix of one row or one column, and an
+// empty list without a type.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -48,7 +48,7 @@ class NamedArrays {
   std::optional<int64_t> whole_number(std::string_view name) const;
 
   const std::string& file() const { return file_; }
-  const std::vector<std::string>& notes() const { return notes_; }  // for whoever reads what became of the file
+  const std::vector<std::string>& notes() const { return notes_; }  // for the reader of the verdicts
 
  private:
   const io::ArrayFile& contents_;
@@ -57,7 +57,7 @@ class NamedArrays {
 };
 
 bool is_real(const Array& array);
-// In what arithmetic the numbers of an array were computed. float64 whose numbers are all float32's was single
+// The precision in which the numbers of an array were computed. float64 whose numbers are all float32's was single
 // precision, unless it has no number of more than 16 bits: those are round, and tell nothing.
 Precision precision_of(const Array& array);
 

@@ -1,5 +1,5 @@
-// What somebody vouches for. A rule (model/rules.h), a scene, a plugin or the author of a state promises properties;
-// what nobody promises is not judged, and reports say so (Judge::unpromised), never that it holds.
+// Promises. A rule (model/rules.h), a scene, a plugin or the author of a state promises properties. A property without
+// a promise is not judged; reports list it (Judge::unpromised).
 #pragma once
 #include <cstdint>
 #include <span>
@@ -11,11 +11,11 @@ namespace cutproof::harness {
 // A promise that guests make by name, and the properties (oracles/registry.h) that it stands for.
 struct PromiseWord {
   std::string_view name;  // as in files and plugins
-  std::string_view text;  // what is promised, in a sentence
+  std::string_view text;  // the promise, as a sentence
   std::span<const std::string_view> properties;
 };
-// In the order in which people read about them. Properties that no word names are asked of everybody: that what was
-// handed over can be read, and that a stage changes nothing that is not its own.
+// In the order of documentation. Properties that no word names are always judged: a readable state, and stages that
+// change only their own fields.
 std::span<const PromiseWord> promise_words();
 
 struct Promises {
@@ -33,7 +33,7 @@ struct Promises {
   // Skin vertices lie anywhere within the cells that the surface passes: "free_skin" is given, and not "skin".
   bool free_skin_places() const;
 };
-// What the rules of a setup promise whatever clusters a body was given.
+// Promises of a setup's rules for any clusters of a body.
 inline constexpr Promises kPromisesOfRules = {.coupling_without_edge_cover = false,
                                               .maximality_after_expansion = false};
 

@@ -1,4 +1,4 @@
-// What the verdicts of a property came to over a run or a campaign.
+// Summary of the verdicts of a property over a run or a campaign.
 #pragma once
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
@@ -21,8 +21,7 @@ struct PropertySummary {
   int64_t undecided = 0;  // of what was checked (Verdict::undecided)
   double seconds = 0;     // of judging, by all threads (Verdict::took)
   double measured = 0;    // greatest
-  // Greatest measured / bound: how much room the bound leaves to what was found. Nothing where every bound is 0, as it
-  // is of what is counted.
+  // Greatest measured / bound. Empty if every bound is 0, as for counts.
   std::optional<double> of_bound;
 };
 

@@ -11,7 +11,7 @@ namespace cutproof::harness {
 struct RecordedKick {
   oracles::KickedRuns runs;
   std::vector<double> time;        // [frames] [s]; empty: not given
-  std::vector<std::string> notes;  // on what was passed over
+  std::vector<std::string> notes;  // on ignored arrays
 };
 
 const std::vector<KnownArray>& kick_arrays();

@@ -1,4 +1,4 @@
-// The reference's stages, for those who compare with it: oracles/ must not know it.
+// The reference's stages, for comparisons: oracles/ must not depend on the reference.
 #pragma once
 #include "oracles/comparison/stage_comparison.h"
 #include "reference_cpu/reference.h"

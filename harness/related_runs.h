@@ -29,7 +29,7 @@ struct JudgedRelation {
   bool holds() const;
 };
 
-// Throws InputError where a file cannot be understood, or where a map needs what is not there.
+// Throws InputError if a file cannot be read, or lacks an array that a map needs.
 JudgedRelation judge_relation(const oracles::RunMap& map, const RelatedFiles& files,
                               const std::function<void(int64_t frame)>& frame_done = {});
 // Of two runs in memory. Any map but `split` and `refine`.

@@ -13,8 +13,8 @@
 
 namespace cutproof::harness {
 
-// Each relation costs runs of its own, so not every frame is asked; the rule is fixed, so that a run can be judged
-// again. Asked are
+// Each relation costs further runs, so only some frames are judged. The rule is fixed, so that a run can be judged
+// again:
 // - frames 0, 8, 16, …;
 // - the first frame after a cut, that is one that removes nothing after one that did;
 // - a frame that begins with more components of tissue than the one before it: pieces that are new.
@@ -26,15 +26,15 @@ class RelationSample {
   RelationSample(const Setup& setup, std::unique_ptr<Backend> second);
   ~RelationSample();
 
-  // Every moment of one body in order, whoever ran it. When a frame ends that is asked, its relations begin to run in a
-  // thread of their own; what that throws the next call throws.
+  // Every moment of one body in order, whoever ran it. At the end of such a frame, its relations begin to run in a
+  // thread of their own. The next call throws the exceptions of that thread.
   void see(const Moment& moment);
   // Until what was asked last is answered.
   void wait();
   // Of what has been asked all but the last frame, and that one too after wait().
   std::vector<Verdict> take_verdicts();
 
-  // How many frames were asked, and what could not be asked of this backend: one sentence each.
+  // Number of judged frames, and relations that this backend cannot run: one sentence each.
   std::vector<std::string> notes() const;
 
  private:

@@ -1,4 +1,4 @@
-// A run of somebody else's simulator, frame by frame, from named arrays (docs/reference/run.md).
+// A run of another simulator, frame by frame, from named arrays (docs/reference/run.md).
 #pragma once
 #include <array>
 #include <cstdint>
@@ -18,7 +18,7 @@
 
 namespace cutproof::harness {
 
-// What a segment may hold. Of texts: `promises`.
+// Arrays that a segment may contain. Texts: `promises`.
 const std::vector<KnownArray>& run_arrays();
 const std::vector<KnownArray>& run_texts();
 
@@ -38,10 +38,10 @@ class RunSegment {
   Precision precision() const { return precision_; }  // of the positions
   oracles::RunFrame frame(int64_t k) const;           // k-th of the segment, whose spans live as long as it
 
-  oracles::RunHeader header() const;  // what is given once: of the first segment
+  oracles::RunHeader header() const;  // arrays that are given once: of the first segment
   // Of a later segment: it would be passed over, whatever it said.
   void refuse_what_is_given_once() const;
-  // Nothing where this segment does not give them anew.
+  // Empty where this segment does not give them again.
   std::optional<oracles::RunCoupling> coupling() const;
   std::vector<double> mass() const;  // [n] [kg]
   bool has_vertices() const { return in_.has("vertices"); }
@@ -76,7 +76,7 @@ class RunSegment {
   std::optional<Triangles> triangles_;
 };
 
-// The frames of a run, one after the other, each with what came with it.
+// The frames of a run, one after the other, each with its arrays.
 class RunFrames {
  public:
   explicit RunFrames(io::RunSegments segments) : segments_(std::move(segments)) {}
@@ -90,7 +90,7 @@ class RunFrames {
   int64_t segments() const { return begun_; }               // begun so far
   // Of the first segment, which alone gives it; valid after the last frame, too.
   const oracles::RunHeader& header() const { return *header_; }
-  // What holds in the frame: what a segment does not give anew goes on. Null: nothing was given yet.
+  // Valid in the frame; arrays that a segment does not give again stay valid. Null: not given so far.
   const oracles::RunCoupling* coupling() const { return coupling_ ? &*coupling_ : nullptr; }
   bool has_new_coupling() const { return begins_segment() && is_new_coupling_; }
   std::span<const Vec3> skin_places() const { return segment_->vertices(in_segment_); }

@@ -20,7 +20,7 @@
 
 namespace cutproof::harness {
 
-// What is to observe a run; what is empty does not.
+// Observers of a run; empty ones are absent.
 struct Observers {
   std::optional<Depth> judge = {};
   std::optional<AgainstMode> against = {};
@@ -29,7 +29,7 @@ struct Observers {
   std::string page = {};  // name of a page that shows the run, and beside `against` the reference's: both are recorded
 };
 
-// A setup, the state in which the run begins, and what else is known of them. They must outlive the session.
+// A setup, the initial state, and further data on both. They must outlive the session.
 struct RunInput {
   const Setup& setup;
   const State& start;
@@ -40,8 +40,8 @@ struct RunInput {
   std::vector<std::string> notes = {};       // for the reader of the verdicts
 };
 
-// Owns the observers and the order in which they see the run. However the program ends, no recording stays that is not
-// complete, and none that nobody asked for: what is recorded for a page alone has no name once it can be read.
+// Owns the observers and the order in which they see the run. However the program ends, no incomplete and no
+// unrequested recording stays. A recording that only a page needs has no name once it can be read.
 class RunSession {
  public:
   // `make` gives more backends of the kind of `backend`, which must outlive this. Throws what io::Recorder throws, so
@@ -54,14 +54,14 @@ class RunSession {
   void run(const std::function<void(const FrameResult&)>& on_frame, const StopAsked& stop_asked = {});
   bool is_stopped() const { return is_stopped_; }
 
-  // The rest is complete after run(). Null is what was not wanted.
+  // The rest is complete after run(). Null: not requested.
   const std::vector<FrameResult>& frames() const { return frames_; }
   const SceneJudge* judge() const { return judge_ ? &*judge_ : nullptr; }
   const Against* against() const { return against_ ? &*against_ : nullptr; }
   const Errors* errors() const { return errors_ ? &*errors_ : nullptr; }
   const io::RecordingReader* recording() const { return recording_.get(); }  // for the page
   const io::RecordingReader* reference_recording() const { return reference_recording_.get(); }
-  // What the backend did that its contract does not allow; the judge has them too.
+  // Violations of the backend's contract; the judge has them too.
   const std::vector<Verdict>& broken_contracts() const { return broken_; }
   // Stages that the backend cannot run, as far as anybody looked at them.
   std::vector<std::string> left_to_reference() const { return stages_.left(); }

@@ -1,4 +1,4 @@
-// The skin of a run of somebody else's simulator, judged where it is new or the blade has been (tolerances.md, Runs).
+// The skin of a run of another simulator, judged where it is new or where the blade has swept (tolerances.md, Runs).
 #pragma once
 #include <optional>
 #include <vector>
@@ -12,7 +12,7 @@ class RunSkin {
  public:
   // After `judge` has seen the frame.
   void see(const RunFrames& frames, const oracles::RunJudge& judge);
-  // Adds verdicts and what was not judged; nothing of a run without a skin.
+  // Adds verdicts and notes on properties that were not judged; nothing for a run without a skin.
   void finish(bool is_promised, JudgedRun& judged) const;
 
  private:

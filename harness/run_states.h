@@ -1,4 +1,4 @@
-// A run of somebody else's simulator as the states of one body, frame by frame in any order, for who shows it.
+// A run of another simulator as the states of one body, frame by frame in any order, for pages.
 #pragma once
 #include <functional>
 #include <optional>
@@ -10,12 +10,12 @@
 
 namespace cutproof::harness {
 
-// Of particles whose spacing nobody gives [m]: the median edge, or as if they filled their box.
+// Spacing of particles where none is given [m]: the median edge, or as if the particles filled their box.
 double plausible_spacing(const Body& body);
 
 class RunStates {
  public:
-  // `open`: the run from its start; called again where somebody goes back. `judged`: what the run came to.
+  // `open`: opens the run at its start, again after a step back. `judged`: the results of the run.
   RunStates(std::function<io::RunSegments()> open, const JudgedRun& judged);
 
   // A bare graph of as many particles as the run ends with, which rest where the first frame has them (NaN: nowhere
