@@ -1,5 +1,5 @@
-// The best that any rotation can do for a matrix A, max tr(Rᵀ A), by a singular value decomposition in extended
-// precision (long double) of A as it is given; with a bound on its own error, found afterwards from the residual.
+// The best value of any rotation for a matrix A, max tr(Rᵀ A), by a singular value decomposition of A in extended
+// precision (long double). A bound on its error follows from the residual.
 #pragma once
 #include <array>
 

@@ -5,9 +5,9 @@
 
 namespace cutproof::oracles {
 
-// "well formed" itself: the only check of states about which nothing is known. `known`: parts that have the bits of a
-// state of the same body that was well formed; of those only the sizes that they share with others are looked at again.
-// kBody: the body was found well formed.
+// "well formed" itself: the only check of arbitrary states. `known`: parts with the bits of a well-formed state of the
+// same body; of these only the sizes that they share with other parts are checked again. kBody: the body is known to be
+// well formed.
 inline constexpr unsigned kBody = 1u << 31;
 Verdict check_form(const Setup& setup, const State& state, unsigned known);
 

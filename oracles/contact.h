@@ -12,8 +12,8 @@ namespace cutproof::oracles {
 
 class Contact {
  public:
-  // `move`: what the blade does in this substep; nullptr: there is none. `walls`: the setup's, or those with what
-  // rounds in them. Keeps a reference to them.
+  // `move`: the blade's motion in this substep, or nullptr. `walls`: the setup's, exact or with rounding. Keeps a
+  // reference to them.
   Contact(const Setup& setup, const BladeMove* move, const std::vector<Wall>& walls);
 
   bool any() const { return has_plate_ || !walls_.empty(); }

@@ -1,4 +1,4 @@
-// What a criterion of detection demands of a particle. Internal to oracles/.
+// The demand of a detection criterion on a particle. Internal to oracles/.
 #pragma once
 
 namespace cutproof::oracles {

@@ -1,4 +1,4 @@
-// Numbers in sentences for people. What programs read (JSON) keeps all digits.
+// Numbers in sentences for people. JSON keeps all digits.
 #pragma once
 #include <fmt/format.h>
 

@@ -12,8 +12,8 @@ namespace cutproof::oracles {
 // connected as long as its members and their being alive stay the same.
 class Judge {
  public:
-  // Keeps references: setup and lists must live as long as this and stay as they are. `lists` begin with
-  // core_properties(); there is no default, so that nobody judges by fewer than he thinks.
+  // Keeps references: setup and lists must outlive this, unchanged. `lists` begin with core_properties(). There is no
+  // default, so that a caller names all properties that it judges by.
   Judge(const Setup& setup, PropertyLists lists);
   ~Judge();
   // All properties of a state in which `after` was the last stage and that are due then; thorough ones only if wanted.

@@ -1,4 +1,4 @@
-// A well-formed state with what several properties derive from it, derived once. For those who write checks.
+// A well-formed state with the data that several properties derive from it, derived once. For authors of checks.
 #pragma once
 #include <optional>
 #include <vector>
@@ -16,11 +16,11 @@ class Judged {
   const Partition& coupling();    // by "shares a cluster"
   int64_t coupled_components();   // how many sets of particles are both connected and coupled
   const Memberships& memberships();
-  // An edge of G whose ends are not coupled: if anything connected is not coupled there is one, and no shorter path
-  // shows it. Else { -1, -1 }.
+  // An edge of G whose ends are not coupled, the shortest path that shows an isolated group; { -1, -1 } if all
+  // connected particles are coupled.
   Edge first_uncoupled_edge();
 
-  // Takes over what was derived from another state of the same body and rests on none of the parts that `differ`.
+  // Takes over derived data of another state of the same body that depend on none of the parts that `differ`.
   void take_over(Judged& last, unsigned differ);
 
   int32_t number(int32_t cluster) const { return clusters.number[at(cluster)]; }

@@ -41,7 +41,7 @@ class Noise {
       uint64_t state = of_equals_ ^ key(size[k], 0) << 2 ^ static_cast<uint64_t>(k);
       r[k] = drawn(state);
     }
-    of_equals_ = of_equals_ * 0xd1342543de82ef95u + 1;  // what is drawn next is another rounding
+    of_equals_ = of_equals_ * 0xd1342543de82ef95u + 1;  // the next draw is another rounding
     return {r.x * (std::abs(size.x) + more), r.y * (std::abs(size.y) + more), r.z * (std::abs(size.z) + more)};
   }
 

@@ -25,8 +25,8 @@ Demand openness(const Body& body, const State& state, int32_t i, int32_t j, doub
 // from which side of the blade's plane their ends are on, and with `nearer` from which end the clusters carry nearer to
 // it. Where rounding leaves some of that open, one choice of all of it must explain all particles that hang on it.
 // Where that is too much to try, each particle must be explained by some choice of its own; and where even that is, it
-// must stay if no choice takes it, and go if every one does, as far as bounds of its count of open edges tell. Whoever
-// may do both then counts as undecided.
+// must stay if no choice takes it, and go if every one does, as far as bounds of its count of open edges tell. A
+// particle with both answers then counts as undecided.
 class OneEndOfEach {
  public:
   // `known_rotations`: as StageRun has it. Where that of a cluster is not known which holds an end of an edge, either
@@ -83,8 +83,8 @@ class OneEndOfEach {
   std::vector<std::vector<int32_t>> edges_at_;  // [n] of them, those at a particle
   std::vector<uint8_t> negative_;               // [n] whether it is on the blade's negative side, if that is decided
   std::vector<int32_t> side_bit_;               // [n] whether it is, if rounding decides; -1: that is decided
-  int32_t bits_ = 0;                            // what rounding decides
-  int64_t unknown_ = 0;                         // edges of which nobody knows the nearer end
+  int32_t bits_ = 0;                            // inconclusive decisions
+  int64_t unknown_ = 0;                         // edges whose nearer end is not known
 };
 
 }  // namespace cutproof::oracles

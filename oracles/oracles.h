@@ -3,11 +3,11 @@
 //
 // Every function fills property, holds, measured, bound, unit, bound_source, checked, vacuous and witness, and the
 // frame from the state; the caller adds stage, backend and body. None throws on a broken state, however broken: offsets
-// out of range, particles that do not exist and NaN are verdicts. Of a state that is not well formed all but
-// well_formed answer that they could not be judged (holds = false; could_be_judged). A verdict of which measured value
-// or bound is not finite fails.
+// out of range, particles that do not exist and NaN are verdicts. For a state that is not well formed, all functions
+// but well_formed answer that the state could not be judged (holds = false; could_be_judged). A verdict whose measured
+// value or bound is not finite fails.
 //
-// Each is a property of oracles/registry.h, asked by itself; oracles/judge.h asks them all.
+// Each function is a property of oracles/registry.h; oracles/judge.h checks them all.
 #pragma once
 #include "oracles/judge.h"
 #include "oracles/partitions.h"
@@ -97,7 +97,7 @@ inline constexpr StageOracle expansion{"expansion", Stage::expand};
 // Where vertices lie on their grid edges: those that were there before stay, those that a blade has brought about lie
 // where its plane crosses the edge, within what rounding leaves open. `measured` and `bound` [h].
 inline constexpr StageOracle skin_reach{"skin reach", Stage::skin};
-// Nothing but what a stage may change has changed (positions by split, clusters by step, …).
+// A stage has changed only the fields that it may change (no positions by split, no clusters by step, …).
 inline Verdict untouched(const Setup& setup, Stage stage, const State& before, const State& after) {
   return StageOracle{"untouched", stage}(setup, before, after);
 }

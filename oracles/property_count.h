@@ -1,4 +1,5 @@
-// How many properties hold, for what people read: each property counts once, after however many stages it is asked.
+// The number of properties that hold, for people: each property counts once, whatever the number of stages that it is
+// checked after.
 #pragma once
 #include <cstdint>
 #include <map>
@@ -7,10 +8,10 @@
 
 namespace cutproof::oracles {
 
-// What a scene expects of its whole run is no property of the method: the names of those verdicts begin so.
+// Expectations of a scene are no properties of the method; the names of their verdicts begin like this.
 inline constexpr std::string_view kExpectation = "expected ";
 
-// Nor is what is asked of the judging itself: whether anything was judged, and all of it.
+// Properties of the judging itself, such as completeness, are no properties of the method either.
 inline bool is_of_the_judging(std::string_view property) {
   for (const char* const one :
        {"something was judged", "something was compared", "the run is whole", "every property looked at something"}) {
@@ -34,10 +35,10 @@ struct AfterStage {
   bool fails_as_expected = false;
 };
 
-// Of those that looked at something; of the judging itself only what fails.
+// Of properties that judged something; of the judging itself only failures.
 struct PropertyCount {
   int64_t hold = 0, fail = 0, fail_as_expected = 0;
-  int64_t met = 0, unmet = 0;  // of what the scene expects
+  int64_t met = 0, unmet = 0;  // of the scene's expectations
   int64_t properties() const { return hold + fail + fail_as_expected; }
 };
 

@@ -1,4 +1,4 @@
-// What acts on a body from outside in one frame. Internal to oracles/.
+// External forces on a body in one frame. Internal to oracles/.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -9,7 +9,7 @@
 
 namespace cutproof::oracles {
 
-// What may push along an axis in one frame.
+// Contacts that may push along an axis in one frame.
 enum class Pushes { none, up, down, any };
 
 inline bool holds_in(const Setup& setup, const Grip& grip, int64_t frame) {
@@ -17,7 +17,7 @@ inline bool holds_in(const Setup& setup, const Grip& grip, int64_t frame) {
   return std::any_of(first, first + setup.step.substeps, [](auto active) { return active != 0; });
 }
 
-// On what no grip holds.
+// On particles that no grip holds.
 inline std::array<Pushes, 3> pushes_on_free(const Setup& setup, const State& before) {
   const int64_t substeps = setup.step.substeps, first = before.frame * substeps;
   bool any = false;

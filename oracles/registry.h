@@ -1,5 +1,4 @@
-// What can be judged: every property once, with its name, where it comes from, what it rests on, when it applies, and
-// the check. Who judges walks such a list and names no property by itself.
+// The list of all properties: name, source, input, condition and check. Judges walk such a list and name no property.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -13,7 +12,7 @@
 
 namespace cutproof::oracles {
 
-class Judged;  // oracles/judged.h: a well-formed state and what follows from it
+class Judged;  // oracles/judged.h: a well-formed state and derived data
 
 // Whether the rotation that a step has left to a cluster is in the state after it. Where that was made from a later
 // one, in which clusters have changed, none of those may be known to have kept it; or none may come from it at all, and
@@ -30,11 +29,11 @@ struct StageRun {
   std::span<const RotationKnown> known_rotations = {};
 };
 
-// What a check costs beside a frame of the reference: less, or more.
+// Cost of a check, compared with a frame of the reference: less, or more.
 enum class Cost { cheap, thorough };
 
 // When a property of a state applies: in words, and whether a state in which `after` was the last stage must have it.
-// What later stages still owe is not asked for. Must be safe on states that are not well formed.
+// Tasks of later stages are not required. Must be safe on states that are not well formed.
 struct Due {
   std::string_view text = {};
   bool (*holds)(const Setup& setup, const State& state, Stage after) = nullptr;
@@ -46,10 +45,10 @@ struct Due {
 struct Property {
   std::string_view name;    // as verdicts name it, unique among all lists
   std::string_view source;  // section of the docs that demands it or derives its bound
-  std::string_view unit;    // of what is measured
+  std::string_view unit;    // of the measured value
   unsigned rests_on;        // parts of the state, and of nothing else but the setup (model/fields.h, Part)
   Cost cost;
-  StageSet promised_by;      // stages whose answer it belongs to: asked when such a stage is judged
+  StageSet promised_by;      // stages whose answer the property judges
   Due due;                   // of a property of a state
   std::string_view nothing;  // why nothing was checked, where nothing was
   void (*check_state)(Judged& judged, Verdict& verdict);
@@ -63,12 +62,12 @@ using PropertyLists = std::vector<const PropertyList*>;
 // Those that need CGAL stand in oracles/surface/surface.h.
 const PropertyList& core_properties();
 
-// The motion, computed again: what a step of the reference costs, and a few times that where rounding decides much.
+// The motion, computed again: costs a step of the reference, or a few steps where much is inconclusive.
 const PropertyList& motion_properties();
 
-// Of a state that comes by itself, without the run that led to it: its list of removed particles names every one that
-// was ever taken out, where a state of a run names those of its frame; and its rotations are held against its
-// positions, where those of a run follow from the step. Who judges such a state adds this list.
+// Properties of a single state without its run. The list of removed particles then names all particles ever removed,
+// not those of one frame. Rotations are compared with positions; in a run they follow from the step. The judge of such
+// a state adds this list.
 const PropertyList& lone_state_properties();
 
 // Throws std::out_of_range if the list has no property of this name.
@@ -79,7 +78,7 @@ const Property& property_named(const PropertyList& list, std::string_view name);
 Verdict ask(const Property& property, const Setup& setup, const State& state);
 Verdict ask(const Property& property, const Setup& setup, Stage stage, const State& before, const State& after);
 
-// The same of states that are known to be well formed, and of stages given what "well formed" said of both states.
+// The same for states that are known to be well formed, and for stages with the verdicts "well formed" of both states.
 Verdict ask(const Property& property, Judged& judged);
 Verdict ask(const Property& property, const StageRun& run, const Verdict& form_before, const Verdict& form_after);
 

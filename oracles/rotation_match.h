@@ -19,10 +19,10 @@ enum class Lag {
   a_step  // half a right angle: it was taken before a step, or an iteration, that moved the particles
 };
 
-// What the particles of a cluster say about its rotation.
+// The rotation that the particles of a cluster determine.
 struct ShapeMatrix {
   Mat3 a;               // A = Σ w (x − t)(X − T)ᵀ [kg m²]
-  double rounding = 0;  // by how much, in the Frobenius norm, A may be off from that of whoever computed it [kg m²]
+  double rounding = 0;  // greatest difference of A from the backend's A, in the Frobenius norm [kg m²]
 };
 // Requires particles that `rest` and x have, and finite numbers. `place_rounding`: State::place_rounding [m].
 ShapeMatrix shape_matrix(const WeightedRest& rest, std::span<const int32_t> particles, const std::vector<Vec3>& x,
@@ -38,8 +38,8 @@ struct RotationMatch {
 // Requires R finite.
 RotationMatch match_rotation(const ShapeMatrix& shape, const Mat3& r, double unit_roundoff, Lag lag);
 
-// What a rotation that is not the best one is instead, as the end of a sentence: "; its transpose is the best one", or
-// that it is the identity; "" if it is nothing that is known by name.
+// A name for a rotation that is not the best one, as the end of a sentence: "; its transpose is the best one", or that
+// it is the identity; "" if it has no name.
 std::string known_confusion(const BestRotation& best, const Mat3& r);
 
 }  // namespace cutproof::oracles

@@ -1,5 +1,5 @@
-// What single operations of shape matching round, by the numbers that enter them (tolerances.md, What a step
-// rounds). Internal to oracles/.
+// Rounding errors of single operations of shape matching, by their operands (tolerances.md, What a step rounds).
+// Internal to oracles/.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -39,8 +39,8 @@ inline Vec3 stored_place(const Body& body, Precision precision, int32_t i, Vec3 
   return precision == Precision::binary32 ? x - body.rest_position(i) : x;
 }
 
-// What a rounding error of so many roundings of one size seldom exceeds, in standard deviations: 8, with probability
-// 3e-14 (Higham and Mary 2019; tolerances.md, Linear momentum).
+// Bound of a sum of many roundings of one size, in standard deviations: exceeded with probability 3e-14 (Higham and
+// Mary 2019; tolerances.md, Linear momentum).
 inline constexpr double kDeviations = 8;
 
 // An explicit method is stable only while dt² k / m <= 4, so forces add at most so many times what moved, divided by
@@ -51,7 +51,7 @@ inline constexpr double kStableForces = 4;
 // a noisy simulator).
 inline constexpr double kNoiseFactor = 64;
 
-// Of many comparisons the one that comes nearest to its bound, or goes farthest beyond. What is not a number is beyond.
+// Of many comparisons the one that comes nearest to its bound, or goes farthest beyond. NaN is beyond.
 struct Nearest {
   double share = -1, measured = 0, bound = 0;
   int32_t where = -1;

@@ -1,5 +1,5 @@
-// Internal to oracles/: the sums of shape matching (method.md §2, §3), written down a second time so that no oracle
-// trusts what a backend stored, and the constants of the rounding bounds of tolerances.md.
+// Internal to oracles/: the sums of shape matching (method.md §2, §3), implemented a second time so that no oracle
+// trusts a backend's values, and the constants of the rounding bounds of tolerances.md.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -22,7 +22,7 @@ struct ClusterMeans {
   Vec3 current;     // t_c [m]
 };
 
-// What the means of many clusters are made of, looked up once for each particle.
+// Terms of the means of many clusters, computed once for each particle.
 struct WeightedRest {
   std::vector<double> weight;  // [n] w_ic = m_i / n_i, the same for every cluster of i; 0 if the particle lies in none
   std::vector<Vec3> position;  // [n] X_i [m]
@@ -83,8 +83,8 @@ inline double goal_rounding(const RoundingScale& scale) {
   return 3.0 * std::sqrt(3.0) * operations * scale.unit_roundoff * scale.extent;
 }
 
-// To what a single error of an iterate can grow in later iterations, at most: the plain iteration never lengthens it;
-// Chebyshev's weights carry it on (tolerances.md, Accelerated steps: 6.3).
+// Greatest growth of a single error of an iterate in later iterations: the plain iteration never enlarges it;
+// Chebyshev's weights do (tolerances.md, Accelerated steps: 6.3).
 inline double error_growth(const StepParameters& step) {
   return step.acceleration == Acceleration::chebyshev ? 7.0 : 1.0;
 }

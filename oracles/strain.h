@@ -1,4 +1,4 @@
-// What the strain criterion demands of each particle (method.md §4). Internal to oracles/.
+// The demand of the strain criterion on each particle (method.md §4). Internal to oracles/.
 #pragma once
 #include <vector>
 

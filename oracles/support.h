@@ -1,5 +1,5 @@
-// What several oracles of topology need: grid edges between alive particles, disjoint sets, and verdicts that are not
-// judged because the state is not well formed. Internal to oracles/.
+// Helpers of oracles of topology: grid edges between alive particles, disjoint sets, and verdicts of states that are
+// not well formed. Internal to oracles/.
 #pragma once
 #include <fmt/format.h>
 
@@ -76,7 +76,7 @@ class DisjointSets {
   std::vector<int32_t> parent_;
 };
 
-// What two sets, in any order, do not have in common; ascending.
+// The symmetric difference of two sets in any order; ascending.
 struct SetDifference {
   std::vector<int32_t> only_first, only_second;
 };
@@ -127,7 +127,7 @@ Witness witness_of(Concerned concerned, fmt::format_string<Readable<Args>...> te
           sentence<Args...>(text, std::forward<Args>(args)...), std::move(concerned.triangles)};
 }
 
-// For a verdict that fills in by itself what was measured.
+// For a verdict that computes its measured value itself.
 inline void fail(Verdict& verdict, Witness witness) {
   verdict.holds = false;
   verdict.witness = std::move(witness);
@@ -145,8 +145,8 @@ void violate(Verdict& verdict, Concerned concerned, fmt::format_string<Readable<
   verdict.measured += 1;
 }
 
-// A verdict as it is given out. What was measured against a bound says nothing where one of the two is not finite, so
-// it does not hold; and where nothing was checked it says why: `nothing`, unless the check has said so itself.
+// Completes a verdict. A verdict with a measured value or bound that is not finite does not hold. A verdict without
+// checks gives the reason `nothing`, unless the check has given one.
 inline Verdict conclude(Verdict verdict, std::string_view nothing) {
   if (verdict.holds && !(std::isfinite(verdict.measured) && std::isfinite(verdict.bound))) {
     verdict.holds = false;

@@ -6,7 +6,7 @@
 
 namespace cutproof::oracles {
 
-// What `judge` returns, with the wall time of the call (Verdict::took).
+// The result of `judge`, with the wall time of the call (Verdict::took).
 template <class Judge>
 Verdict timed(Judge&& judge) {
   const auto begin = std::chrono::steady_clock::now();

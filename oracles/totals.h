@@ -1,4 +1,4 @@
-// Sums over the particles of a body, in extended precision, so that only the rounding of what is judged is left.
+// Sums over the particles of a body, in extended precision, so that only the rounding of the judged values is left.
 // Internal to oracles/.
 #pragma once
 #include <array>

@@ -1,4 +1,4 @@
-// What a blade sweeps, carried to where the tissue that it passes rests: the ideal cut of tissue that moves.
+// The sweep of a blade, carried to the rest positions of the tissue that it passes: the ideal cut of moving tissue.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -11,12 +11,12 @@
 namespace cutproof::oracles {
 
 // Frame by frame, the leading sides of the plate (those of its four sides that move outwards; its other sides follow in
-// what these have opened), and the plate as a whole where a stroke begins. Each point of these is carried from where it
-// was in the deformed tissue at that time to where that tissue rests, by the affine map that fits the particles within
-// kReach best, near ones more (moving least squares, P. Lancaster and K. Salkauskas, Math. Comp. 37(155), 1981);
-// towards the rotation that fits best, as far as these particles do not determine it. Positions within a frame are
-// taken to go straight from its first state to its last. Where no living particle is near there is no surface; a
-// particle that is at no finite place, or beyond 2⁵⁰ h, is near nothing.
+// what these have opened), and the plate as a whole where a stroke begins. Each point is carried from the deformed
+// tissue at that time to the tissue at rest, by the affine map that fits the particles within kReach best, near ones
+// more (moving least squares, P. Lancaster and K. Salkauskas, Math. Comp. 37(155), 1981). Where these particles do not
+// determine the map, it tends to the best rotation. Positions within a frame are taken to go straight from its first
+// state to its last. Where no living particle is near there is no surface. A particle without a finite place, or beyond
+// 2⁵⁰ h, is near nothing.
 class CarriedSweep {
  public:
   static constexpr double kReach = 2.5;   // [h]
@@ -28,7 +28,7 @@ class CarriedSweep {
   // Whether the blade is down at any time in a frame; others need not be added. Not in frames that the setup has not.
   bool wants(int64_t frame) const;
   // The frame `before`.frame, of which these are the first and the last state. If either is not well formed, the frame
-  // has no surface: what is wrong then is for well_formed to say.
+  // has no surface, and well_formed fails.
   void add(const State& before, const State& after);
 
   // Of the frames that were added; body frame at rest [m].

@@ -1,5 +1,5 @@
-// What a body that meets nothing must keep: momentum and mass, and of energy that it does
-// not grow. measure_and_tune.md, Conservation says what is measured.
+// Conservation of a body without contacts: momentum and mass are constant, and energy does not grow
+// (measure_and_tune.md, Conservation).
 #pragma once
 #include <optional>
 
@@ -10,8 +10,8 @@ namespace cutproof::oracles {
 // The body alone: no blade, walls, grips, gravity, damping, detection or skin; `frames` frames like the one of
 // state.frame.
 Setup free_setup(const Setup& setup, int64_t frame, int64_t frames);
-// What it does in the beginning, so that there is something to conserve: it drifts by 0.002 h a substep, spins by 0.01
-// radians a substep about (1, 2, 3), and stretches by 0.001 a substep along that axis.
+// The initial motion: the body drifts by 0.002 h a substep, spins by 0.01 radians a substep about (1, 2, 3), and
+// stretches by 0.001 a substep along that axis.
 void set_in_motion(const Setup& setup, State& state);
 
 struct Conservation {

@@ -1,5 +1,5 @@
-// For fixed rotations, where an implicit substep comes to rest with a blade and friction (method.md §3): the t for
-// which every particle is where contacts put it and every t is its cluster's mean. Internal to oracles/.
+// The fixed point of an implicit substep with a blade and friction, for fixed rotations (method.md §3): the t for which
+// every particle is where contacts put it and every t is its cluster's mean. Internal to oracles/.
 #pragma once
 #include <memory>
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace cutproof::oracles {
 
-// Newton's method on t. A particle is at Π(x~ + s (g(t) − x~)), Π where contacts let it be, so t rests where
+// Newton's method on t. A particle is at Π(x~ + s (g(t) − x~)), where Π projects to allowed places. So t is fixed where
 // `Σ_i w_ic Π_i − M_c t_c = 0`, with the derivative `−(diag(M) − s Σ_i w_i / n_i u_i u_iᵀ ⊗ Π'_i)`. Π is the nearest
 // point of a closed set but for friction, and where blade and walls act in turn; then it is the gradient of a convex
 // function (Asplund 1973), so Π' is symmetric and nowhere negative, and the derivative is the Hessian of E over x and t
@@ -26,8 +26,8 @@ class ContactStage {
   // From where centers [m] are at `center`, which then are where they came to rest.
   Rest rest(const std::vector<Mat3>& rotation, std::vector<Vec3>& center);
 
-  // Whether particles rest at a strict minimum of E over x and t. With friction there is no such thing; where blade and
-  // walls act in turn nobody knows.
+  // Whether particles are at a strict minimum of E over x and t. With friction there is no minimum; where blade and
+  // walls act in turn, this is not known.
   bool is_strict_minimum(const Rest& rest);
 
  private:

@@ -1,6 +1,5 @@
-// The shape of a cut beside the ideal one. Figures, not verdicts: measure_and_tune.md, Geometry says
-// what each of them means. Where something is broken a figure is not a number; nothing is left
-// out.
+// Compares the shape of a cut with the ideal one. Figures, not verdicts (measure_and_tune.md, Geometry). A figure of
+// broken data is not a number; nothing is left out.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -17,11 +16,11 @@ namespace cutproof::oracles {
 // moves in its own plane sweeps a surface; of one that turns on the spot this is the hull of what it passes through.
 std::vector<std::array<Vec3, 3>> swept_surface(const Setup& setup, int64_t first_frame, int64_t end_frame);
 
-// The cut at rest: before it is what was alive in `before`.
+// The cut at rest; the uncut tissue is that of `before`.
 struct CutGeometry {
   // Area of the ideal cut inside the tissue, which is the union of the cubes of side h around the particles [h²].
   // Counted along lines parallel to the axes, h / kLinesPerSpacing apart, that cross it: dA = Σ_a |n_a| · |n_a| dA, and
-  // |n_a| dA is what the lines along axis a count. What the blade passes twice counts once.
+  // |n_a| dA is what the lines along axis a count. An area that the blade passes twice counts once.
   double cut_area = 0;
   double lost_volume = 0;                // of the particles that died [h³]
   std::optional<double> lost_per_area;   // [h]; absent without a cut

@@ -6,10 +6,10 @@
 
 namespace cutproof::oracles {
 
-// What the project asks of positions after one stage (tolerances.md, Against the reference) [h].
+// Required accuracy of positions after one stage (tolerances.md, Against the reference) [h].
 inline constexpr double kPositionsWanted = 1e-4;
 
-// What is not a number counts as infinite.
+// NaN counts as infinite.
 struct ErrorNorm {
   double max = 0;
   int32_t where = -1;  // index of the greatest; -1 if there is none
@@ -40,7 +40,7 @@ struct ErrorNorm {
   double rms() const { return count == 0 ? 0 : std::sqrt(sum_of_squares / static_cast<double>(count)); }
 };
 
-// Of what is so broken that nothing can be measured.
+// Error of data that cannot be measured.
 inline ErrorNorm infinite_error() {
   ErrorNorm norm;
   norm.add(std::numeric_limits<double>::infinity(), -1);

@@ -1,4 +1,4 @@
-// Lines parallel to an axis, through triangles: what areas and volumes are counted along. Internal to
+// Lines parallel to an axis, through triangles, along which areas and volumes are integrated. Internal to
 // oracles/comparison/.
 #pragma once
 #include <algorithm>

@@ -1,5 +1,5 @@
-// The reference solution of one implicit substep (method.md §3), without its iteration: for fixed rotations find where
-// x and t come to rest together, by sparse factors; alternate with the rotations.
+// The reference solution of one implicit substep (method.md §3), without its iteration: alternates between rotations
+// and, for fixed rotations, the fixed point of x and t by sparse factorisation.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -22,8 +22,8 @@ struct ReferenceSolution {
 };
 
 // The first substep of frame state.frame. Requires Solver::implicit and room between the walls (throws
-// std::invalid_argument). With a blade or friction there may be several places of rest: which one it is, the first
-// plain iterations say.
+// std::invalid_argument). With a blade or friction there may be several fixed points: the first plain iterations choose
+// one.
 ReferenceSolution reference_solution(const Setup& setup, const State& state);
 
 // Which answer of a substep counts (method.md §3), and how it was found.
@@ -52,9 +52,9 @@ struct SubstepAnswer {
   };
   std::optional<Elsewhere> elsewhere;
 };
-// With a blade in the tissue or friction there may be several places of rest, and the answer is that to which the plain
-// iteration leads: what reference_solution has found counts where plain_limit comes within kMeets of it. Without them
-// its minimum is the answer. Requires what reference_solution does.
+// With a blade in the tissue or friction there may be several fixed points, and the answer is the limit of the plain
+// iteration. The result of reference_solution counts if plain_limit comes within kMeets of it. Without blade and
+// friction the minimum is the answer. Requirements as for reference_solution.
 SubstepAnswer substep_answer(const Setup& setup, const State& state);
 
 // E of method.md §3 at positions x, minimised over t and R: what `energy_is_monotone` compares. x~ is computed from
@@ -65,9 +65,9 @@ double substep_energy(const Setup& setup, const State& state, const std::vector<
 // retardation (m (y - y~) / (dt (dt + τ)) + k Σ_c w (y - t - R (X - T))) (dt + τ) / dt.
 std::vector<Vec3> substep_gradient(const Setup& setup, const State& state, const std::vector<Vec3>& x);
 
-// The limit of the plain iteration, in double, written down a second time without reference_cpu/: iterates until the
-// change is below `tolerance` · h or `most` iterations are done. With tolerance 0 exactly `most` are done. Throws as
-// reference_solution does.
+// The limit of the plain iteration, in double, implemented without reference_cpu/: iterates until the change is below
+// `tolerance` · h or `most` iterations are done. With tolerance 0 exactly `most` are done. Throws as reference_solution
+// does.
 struct PlainLimit {
   std::vector<Vec3> x;
   std::vector<Mat3> rotation;

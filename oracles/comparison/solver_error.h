@@ -1,6 +1,5 @@
-// The error that is left because a solver stops iterating. Figures, not verdicts:
-// measure_and_tune.md, Solver says what each of them means. Lengths are in h, the spacing of the
-// grid; what is broken or not a number is infinitely wrong.
+// The error of a solver that stops after finitely many iterations. Figures, not verdicts (measure_and_tune.md, Solver).
+// Lengths are in h, the spacing of the grid; broken data and NaN have an infinite error.
 #pragma once
 #include <optional>
 

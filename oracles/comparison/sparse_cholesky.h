@@ -1,4 +1,4 @@
-// CHOLMOD (Chen, Davis, Hager and Rajamanickam 2008) as values: what it makes is freed, what fails is thrown.
+// CHOLMOD (Chen, Davis, Hager and Rajamanickam 2008) with value semantics: memory is freed, and failures throw.
 #pragma once
 #include <cholmod.h>
 
@@ -15,7 +15,7 @@ class Cholmod {
  public:
   Cholmod() {
     cholmod_start(&common_);
-    common_.print = 0;  // what fails is told by exceptions, not on standard output
+    common_.print = 0;  // failures throw, and are not printed
   }
   ~Cholmod() { cholmod_finish(&common_); }
   Cholmod(const Cholmod&) = delete;
@@ -55,7 +55,7 @@ using Sparse = Made<cholmod_sparse, cholmod_free_sparse>;
 using Dense = Made<cholmod_dense, cholmod_free_dense>;
 using Factor = Made<cholmod_factor, cholmod_free_factor>;
 
-// One entry of a matrix; what several say of one place is added up.
+// One entry of a matrix; several entries of one place add up.
 struct Entry {
   int r = 0, c = 0;
   double v = 0;

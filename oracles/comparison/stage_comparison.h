@@ -25,23 +25,23 @@ using ReferenceStages = std::array<std::function<void(const Setup& setup, State&
 // Greatest extent of the body at rest, over the three axes [h].
 double body_extent(const Body& body);
 
-// What the project asks of the positions after a step [h]; of velocities [h/dt] twice that, because each is the
+// Required accuracy of positions after a step [h]; velocities [h/dt] may err by twice that, because each is the
 // difference of two positions.
 double position_bound(const Body& body);
 
-// What rounding decides, so that both answers are right: counted, and where it is more than the project asks of
-// positions, not measured.
+// Inconclusive differences, where rounding explains both answers: counted, and not measured where they exceed the
+// required accuracy of positions.
 struct Undecidable {
   int64_t removals = 0;   // particles removed by one only, within the rounding band of detection
   int64_t otherwise = 0;  // decisions of steps that the backend has taken, within rounding, as the reference has not
   int64_t positions = 0;  // particles that the rounding of a step carries farther than a bound, or makes faster
   int64_t rotations = 0;  // clusters, the same
-  int64_t undecided = 0;  // of positions: so far that no sharp answer could be asked for (Verdict::undecided)
+  int64_t undecided = 0;  // of positions: too far for a sharp bound (Verdict::undecided)
 
   void join(const Undecidable& other);
 };
 
-// What is measured, each with a bound of its own.
+// The measures, each with its own bound.
 enum class Measure { position, velocity, rotation, rest_center, mass, skin };
 struct MeasureInfo {
   std::string_view name;  // of the property
@@ -64,13 +64,13 @@ struct MeasuredError {
   bool holds() const { return norm.count == 0 || norm.max <= bound; }
 };
 
-// What one stage of a backend is beside the reference's.
+// Comparison of one stage of a backend with the reference's.
 struct StageDifference {
   Stage stage = Stage::step;
   int64_t frame = 0;
   bool is_readable = true;  // `after` is well formed; otherwise decisions.front() says why, and there is nothing else
   bool due = false;
-  State expected;  // what the reference makes of the same state; of undecidable removals it takes the backend's
+  State expected;  // the reference's answer to the same state; inconclusive removals are the backend's
   // Whether the stage ran exactly if it was due, and then the first decision that differs; at most one of each.
   std::vector<DecisionDifference> decisions;
   bool sets_are_open = false;        // the rule leaves several answers, so clusters are not among them

@@ -1,5 +1,5 @@
-// Where two states differ, and by how much: walks model/fields.h and names no field by itself. Two right backends agree
-// on the bits of what they decide, and are near to each other in what they compute (Field::is_decision).
+// Differences of two states: walks model/fields.h and names no field. Two correct backends have the same bits in
+// decisions, and near values in computed fields (Field::is_decision).
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -38,7 +38,7 @@ std::optional<FieldDifference> first_difference_in_bits(const State& expected, c
 struct DecisionDifference : Witness {
   std::string_view field = {};  // Field::name of the first that shows it; empty if it is none of a state
 };
-// Whether clusters, and what is derived from them, are compared: a rule may leave several answers (model/rules.h).
+// Whether clusters and derived fields are compared: a rule may allow several answers (model/rules.h).
 enum class Sets { compared, open };
 // The first difference in what is decided, causes before what follows from them: frame, removed particles and debris,
 // alive particles, tau and cap, clusters, edge_covered, the skin. Clusters are compared as sets with their numbers, the

@@ -1,5 +1,5 @@
-// One implicit substep as a problem (method.md §3): what its energy is made of, and where contacts let particles be.
-// Shares nothing with a backend. Internal to oracles/.
+// One implicit substep as a minimisation problem (method.md §3): its energy, and the places that contacts allow. Shares
+// nothing with a backend. Internal to oracles/.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -13,8 +13,7 @@
 
 namespace cutproof::oracles {
 
-// Everything of E that stays constant during the substep, and what contacts need to know. Keeps references to setup and
-// state.
+// The constants of E during the substep, and the data of contacts. Keeps references to setup and state.
 struct SubstepProblem {
   // The first substep of frame state.frame. Throws std::invalid_argument if the solver is not implicit, the schedule is
   // over, or the state is not well formed.

@@ -1,6 +1,5 @@
-// The error that is left because time goes in steps. Figures, not verdicts:
-// measure_and_tune.md, Time step says what each of them means. Lengths are in h, the spacing of the
-// grid; what is broken or not a number is infinitely wrong.
+// The error of the time step. Figures, not verdicts (measure_and_tune.md, Time step). Lengths are in h, the spacing of
+// the grid; broken data and NaN have an infinite error.
 #pragma once
 #include <functional>
 #include <memory>

@@ -26,8 +26,8 @@ Pose pose_of(const Setup& setup, const State& state, const Pose* earlier);
 // Appends the pose of a state that follows those before.
 void add_pose(std::vector<Pose>& poses, const Setup& setup, const State& state);
 
-// Particles that only one of the two has are counted, and nothing else is asked of them: in a cut that is decided by
-// the tissue's motion, layers next to it may or may not go.
+// Particles that only one of the two has are only counted: in a dynamic cut, layers next to the cut may or may not be
+// removed.
 struct Apart {
   ErrorNorm position;        // of particles alive in both [h]; infinite if one is not a number
   int64_t alive_in_one = 0;  // particles that only one of the two still has

@@ -1,5 +1,4 @@
-// Which iterates of a frame a backend is asked to show, and the judge of what it has shown (tolerances.md, Iterate by
-// iterate).
+// The choice of iterates that a backend shows of a frame, and their judge (tolerances.md, Iterate by iterate).
 #pragma once
 #include <compare>
 #include <cstdint>
@@ -21,7 +20,7 @@ inline constexpr const char *kStepByIterates = "step by iterates", *kIteratesUni
 
 struct IterateFinding;  // oracles/iterates/substep_judge.h
 
-// What a backend has shown of one step.
+// The shown iterates of one step.
 struct ShownStep {
   State before;                 // as the backend holds it: loading rounds in single precision
   std::vector<State> iterates;  // those that were wanted; the last one ends the step

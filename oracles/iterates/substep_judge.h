@@ -1,5 +1,5 @@
-// One substep of a backend, judged iterate by iterate: what one iteration makes of the places and rotations that the
-// backend itself has shown, so nothing has grown, and each decision is one particle's (tolerances.md, Iterate by
+// Judges one substep of a backend iterate by iterate. Each iterate is compared with one iteration from the backend's
+// own previous iterate, so that errors do not grow and each decision is one particle's (tolerances.md, Iterate by
 // iterate). Internal to oracles/.
 #pragma once
 #include <Eigen/Core>
@@ -17,7 +17,7 @@
 
 namespace cutproof::oracles {
 
-// What is compared of an iterate, each with its own bounds.
+// The compared quantities of an iterate, each with its own bounds.
 enum class IteratePart : uint8_t {
   place,
   contact,  // a place that a contact or a grip has made

@@ -36,7 +36,7 @@ struct KickedRuns {
   Precision precision = Precision::binary64;  // of the positions
 };
 
-// What became of one piece.
+// The motion of one piece.
 struct KickedPiece {
   int32_t piece = 0;
   int64_t particles = 0;

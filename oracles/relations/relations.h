@@ -1,6 +1,6 @@
 // Relations between runs of one backend (metamorphic testing; oracles.md, Relations). Each loads, runs and compares;
-// the backend is used only through its contract, so they judge any backend. What a backend cannot run is not asked of
-// it: then the verdict is vacuous and says why, and nothing throws. Target cutproof_relations.
+// the backend is used only through its contract, so they judge any backend. If a backend cannot run a relation, the
+// verdict is vacuous and gives the reason, and nothing throws. Target cutproof_relations.
 #pragma once
 #include <cstdint>
 
@@ -18,14 +18,14 @@ Verdict no_ghost_force(Backend& backend, const Setup& setup, const State& state,
 Verdict determinism(Backend& backend, const Setup& setup, const State& state, int64_t frames);
 // A frame equals the composition of its spans, bit for bit: whole, six single stages, and every cut in two.
 Verdict span_composition(Backend& backend, const Setup& setup, const State& state, int64_t frames);
-// The same scene transformed must give the same answer, transformed (oracles.md, Relations). seed mod 6 chooses
-// 0: turned by a multiple of 90° (mirrored axes excluded), which renumbers particles, and clusters in another order; as
-// 1 where the rule of detection depends on the order of particles (rules.h, RemovePromise); 1: shifted on the grid; 2:
+// The same scene transformed must give the same answer, transformed (oracles.md, Relations). seed mod 6 chooses 0:
+// turned by a multiple of 90° (mirrored axes excluded), which renumbers particles, and clusters in another order; as 1
+// where the rule of detection depends on the order of particles (rules.h, RemovePromise); 1: shifted on the grid; 2:
 // clusters in another order; 3: scaled by a power of two; 4: elsewhere in the world; 5: duplicated as two bodies. The
 // rest of the seed chooses by how much. 3 to 5 in bits; 0 to 2: decisions, clusters and skin vertices exactly, numbers
 // up to rounding (tolerances.md, A transformed scene), merge and expand up to ties, and the fans of the skin's polygons
 // not at all (they follow the numbering of grid edges). A removal that a disturbance of 1e-7 h also changes is
-// undecidable within rounding: then the verdict holds and is vacuous.
+// inconclusive: then the verdict holds and is vacuous.
 inline constexpr uint64_t kEquivarianceKinds = 6;
 Verdict equivariance(Backend& backend, const Setup& setup, const State& state, Span span, uint64_t seed);
 // Geometric cuts: what is separate after fewer strokes stays separate after more (setup with all strokes, without

@@ -1,4 +1,4 @@
-// What several relations share: how they are judged, running a backend, comparing bits. Internal to oracles/relations/.
+// Helpers of relations: judging, running a backend, comparing bits. Internal to oracles/relations/.
 #pragma once
 #include <functional>
 #include <optional>
@@ -23,8 +23,8 @@ struct Relation {
   const char* source;
   const char* nothing;  // why nothing was checked, where nothing was
 };
-// The verdict that `check` fills, which begins as one that holds. It is asked only if the state is well formed, and if
-// the backend can run `span`; else the verdict fails, or says what the backend cannot do.
+// The verdict that `check` fills, which begins as one that holds. `check` runs only if the state is well formed and the
+// backend can run `span`. Otherwise the verdict fails, or is vacuous with the missing ability.
 Verdict judge_relation(const Relation& relation, const Backend& backend, Span span, const Setup& setup,
                        const State& state, const std::function<void(Verdict&)>& check);
 

@@ -1,5 +1,5 @@
-// A transformed scene: turned by quarter turns, shifted on the grid, scaled, its clusters in another order. What a
-// backend answers to it must be what it answers to the scene, transformed. Internal to oracles/relations/.
+// A transformed scene: turned by quarter turns, shifted on the grid, scaled, its clusters in another order. A backend's
+// answer must be its answer to the original scene, transformed. Internal to oracles/relations/.
 #pragma once
 #include <array>
 #include <cstdint>

@@ -1,6 +1,6 @@
-// Whether a step went where rounding lets it go, as far as that can be told from where it began and ended: where a
-// decision hangs on rounding, all that is coupled with it is undecided (docs/design/tolerances.md, The step again). A
-// backend that can be asked is asked more: oracles/iterates/. Internal to oracles/.
+// Whether a step ends within rounding of the method, judged from its first and last state. Where rounding explains both
+// answers of a decision, everything coupled with it is undecided (docs/design/tolerances.md, The step again). Backends
+// that show iterates are judged more sharply: oracles/iterates/. Internal to oracles/.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -16,8 +16,8 @@
 
 namespace cutproof::oracles {
 
-// What of a step is compared, each with its own bounds.
-// `own`: less what its clusters share (StepModel::without_shared).
+// The compared quantities of a step, each with its own bounds. `own`: less what its clusters share
+// (StepModel::without_shared).
 enum class StepPart { position, velocity, rotation, impulse, own_position, own_velocity };
 constexpr const char* name_of(StepPart part) {
   constexpr const char* kNames[] = {"position", "velocity", "rotation", "impulse", "own position", "own velocity"};
@@ -38,7 +38,7 @@ struct AdmissibleStep {
   // small changes holds, or decisions are open on which they hang. They lie within what rounding, or those decisions,
   // can do.
   int64_t undecided = 0;
-  std::vector<double> position_bound;  // [n] what rounding does to the outcome [h]
+  std::vector<double> position_bound;  // [n] effect of rounding on the outcome [h]
   std::vector<double> velocity_bound;  // [n] the same, times dt [h]
   std::vector<double> rotation_bound;  // [m] the same, where it puts the farthest member [h]
   std::vector<double> reach;           // [m] of the farthest member from the center at rest, or 1 if that is less [h]

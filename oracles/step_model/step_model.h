@@ -1,6 +1,6 @@
-// The step of one frame, written once more (method.md §3 and §11), by other means than any backend: rotations by
-// singular value decompositions, impulses from the balance of momentum. It can be asked what rounding does to it: a
-// disturbed run rounds at random wherever a backend has to. Internal to oracles/.
+// The step of one frame (method.md §3 and §11), by other means than any backend: rotations by singular value
+// decompositions, impulses from the balance of momentum. A disturbed run rounds at random wherever a backend has to,
+// and shows the effect of rounding. Internal to oracles/.
 #pragma once
 #include <cstdint>
 #include <span>

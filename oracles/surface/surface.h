@@ -1,5 +1,5 @@
 // Properties of the skin that CGAL decides: a second opinion on its shells, and its shape at rest. Target
-// cutproof_surface_oracles; whoever links it links CGAL's mesh processing, which is under the GPL.
+// cutproof_surface_oracles links CGAL's mesh processing, which is under the GPL.
 #pragma once
 #include <optional>
 

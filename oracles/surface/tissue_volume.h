@@ -1,4 +1,4 @@
-// How much room a skin at rest may enclose (tolerances.md, "Volume of the skin"). Internal to oracles/.
+// Bounds of the volume of a skin at rest (tolerances.md, "Volume of the skin"). Internal to oracles/.
 #pragma once
 #include <cstdint>
 #include <vector>
