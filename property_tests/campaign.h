@@ -1,5 +1,5 @@
-// Random dissections at scale: many bodies in one load, every stage judged by every oracle and compared with the
-// reference. What `cutproof fuzz` runs.
+// Random dissections at scale: many bodies in a batch, every stage judged by every oracle and compared with the
+// reference. `cutproof fuzz` runs these campaigns.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -19,12 +19,12 @@ namespace cutproof::property_tests {
 struct CampaignOptions {
   uint64_t seed = 1;
   int64_t cases = 1000;                // of the whole campaign, all shards together
-  std::optional<double> seconds;       // begins no further load after so long, and judges no further case
+  std::optional<double> seconds;       // begins no further batch and judges no further case after this time
   int least_size = 0, most_size = 79;  // sizes of cases (cases.h) take turns
   bool dynamics = false;               // bodies move as well, and blades cut what they pass
-  int batch = 64;                      // bodies in one load
-  int threads = 1;                     // generate cases, run loads and judge case by case
-  int backends = 1;                    // how many loads may run at once
+  int batch = 64;                      // bodies in a batch
+  int threads = 1;                     // generate cases, run batches and judge case by case
+  int backends = 1;                    // greatest number of concurrent batches
   int devices = 1;                     // on which they run in turn; at most `backends`
   int thorough = 50;                   // every n-th case with CGAL's geometric check
   int64_t shard = 0, shards = 1;       // of cases 0, 1, 2, …: those that are `shard` modulo `shards`
@@ -32,16 +32,16 @@ struct CampaignOptions {
   StopAsked stop_asked;                // begins no further case; those that were judged count
 };
 
-// Makes the backend for a load, on one of `devices` (0 ..); called once for each of `backends` and never for others if
-// `fresh` is false.
+// Makes the backend of a batch, on one of `devices` (0 ..). If `fresh` is false, it is called once for each of
+// `backends` only.
 struct BackendSource {
   std::function<std::unique_ptr<Backend>(int64_t load, int device)> make;
-  bool fresh = false;  // a new one for every load, e.g. because schedules depend on it
+  bool fresh = false;  // a new one for every batch, e.g. because schedules depend on it
 };
 
 // Backends by name, on these devices.
 BackendSource source_of(const harness::BackendChoice& choice, const std::vector<int>& devices);
-// How many loads run at once: as many as so many devices of the backend take, and no more than there are threads.
+// Number of concurrent batches: as many as this number of the backend's devices takes, and at most one for each thread.
 void set_parallel_loads(CampaignOptions& options, const harness::BackendDescriptor& backend, int devices);
 
 struct Violation {
@@ -64,8 +64,7 @@ struct Campaign {
   double generating = 0, running = 0, reference = 0, judging = 0;
 };
 
-// How many bodies a load of it has if nobody says it. A small campaign does not become fewer loads than a device runs
-// at once.
+// Default number of bodies in a batch. A small campaign has at least as many batches as a device runs at once.
 int usual_batch(const CampaignOptions& options, const harness::BackendDescriptor& backend);
 
 // The size of case `index`.

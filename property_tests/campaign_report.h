@@ -1,5 +1,5 @@
-// Campaigns as documents (docs/reference/schemas/fuzz.json): one for each shard, put together to one of the whole, and
-// what follows from it.
+// Campaigns as documents (json.md, fuzz): one for each shard, merged to one of the whole campaign, and its
+// conclusion.
 #pragma once
 #include <nlohmann/json.hpp>
 #include <string>
@@ -28,9 +28,10 @@ std::string missing_shards(const nlohmann::json& document);
 // Throws InputError, naming `file`, if something is missing, or of another kind, that a conclusion reads.
 void require_campaign(const nlohmann::json& document, const std::string& file);
 
-// What follows from a document. `whole`: it is of all shards, so classes of cases that never occurred say something.
+// The conclusion of a document. `whole`: the document is of all shards, so a class of cases that never occurred is a
+// failure.
 struct CampaignConclusion {
-  std::string failure;  // what is wrong, as a sentence without an end; empty: all hold
+  std::string failure;  // the failure, as a sentence without a full stop; empty: all hold
   bool holds() const { return failure.empty(); }
 };
 CampaignConclusion conclude(const nlohmann::json& document, bool whole);

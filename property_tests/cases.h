@@ -1,4 +1,4 @@
-// A random dissection as plain data: what rapidcheck generates and shrinks, what a counterexample is saved as.
+// A random dissection as plain data: rapidcheck generates and shrinks it, and a counterexample is saved as such.
 //
 // All lengths are integers, in quarters of the grid spacing, so that a case reads well, shrinks towards whole nodes,
 // and hits the degenerate positions (a vertex, an edge, a plane of the grid) exactly. So are all other numbers, in
@@ -23,7 +23,7 @@ using Quarters = std::array<int32_t, 3>;  // a point: 4·i is node i of the case
 
 enum class ClusterKind { boxes, sampled, foreign };
 enum class Link { apart, chained, retraced };  // chained: begins where the last stroke ended; retraced: runs it back
-// What takes particles out; usual: distance where the body moves, geometric where nothing does.
+// Criterion of removal; usual: distance where the body moves, geometric where nothing does.
 enum class Removal { usual, geometric, strain };
 
 struct Stroke {
@@ -50,7 +50,7 @@ struct CaseGrip {
   Node low = {0, 0, 0}, high = {0, 0, 0};  // both included
   Quarters pull = {0, 0, 0};               // in each substep [h/100]; 0: pinned
   int32_t from = 0, until = -1;            // substeps of the run; -1: never released
-  bool shared = false;                     // also holds what earlier ones hold at other times
+  bool shared = false;                     // also holds particles of earlier grips, at other times
   friend bool operator==(const CaseGrip&, const CaseGrip&) = default;
 };
 

@@ -1,4 +1,4 @@
-// What the property tests share: over which backends they run, what rapidcheck draws, and how a failure is told.
+// Shared code of the property tests: their backends, the drawing of cases by rapidcheck, and the report of a failure.
 //
 // Environment: CUTPROOF_CASES, how many cases of the first property (default 2000; the others take shares of it);
 // CUTPROOF_SEED, what they are drawn from (default 1); RC_PARAMS, anything that rapidcheck takes, such as the
@@ -35,14 +35,14 @@ uint64_t wanted_seed();
 struct NamedBackend {
   std::string name;
   std::function<std::unique_ptr<Backend>()> make;
-  int64_t fraction = 1;  // one in so many of the wanted cases: what a schedule costs buys fewer of them
+  int64_t fraction = 1;  // divisor of the number of wanted cases: schedules are expensive
   int most_size = 100;   // of a case: every access of a simulated schedule is a decision
 };
 void PrintTo(const NamedBackend& backend, std::ostream* os);
 
-// Every backend that this build has and that is there, the kernels with both methods of splitting, and under several
-// schedules where they can be chosen: each property runs over each of them, under its name. Backends that only find
-// faults run the kernels of another one in another way, and are left out unless their schedule is chosen.
+// Every available backend of this build, the kernels with both methods of splitting, and with several schedules where
+// they can be chosen. Each property runs over each of them, under its name. Backends that only find faults run the
+// kernels of another one in another way, and are left out unless their schedule is chosen.
 std::vector<NamedBackend> all_backends();
 
 class EveryBackend : public ::testing::TestWithParam<NamedBackend> {
@@ -76,12 +76,11 @@ struct Deadline {
   bool is_over() const { return at && std::chrono::steady_clock::now() > *at; }
 };
 
-// What `draw` makes of a seed and a size; it shrinks by simplifications(), until the deadline is over.
+// The case that `draw` makes of a seed and a size. It shrinks by simplifications(), until the deadline.
 using Draw = Case (*)(uint64_t seed, int size);
 rc::Gen<Case> random_cases(std::shared_ptr<const Deadline> deadline, Draw draw = draw_case);
 
-// What was drawn, as the line that a counterexample is saved as, and what is wrong with it, for a person; empty: the
-// property holds.
+// The drawn case, as the line of a saved counterexample, and its failure, for a person; empty: the property holds.
 struct Example {
   std::string line, problem;
 };
@@ -91,7 +90,7 @@ using Attempt = std::function<Example()>;
 // Makes `attempts` of them; on a failure prints the simplest example found, and the line that replays it.
 void check(const std::string& id, int64_t attempts, int most_size, Deadline& deadline, const Attempt& attempt);
 
-// Empty: the property holds. Otherwise what is wrong, for a person. What it throws is wrong, too.
+// Empty: the property holds. Otherwise the failure, for a person. An exception is a failure, too.
 using Property = std::function<std::string(const Case&)>;
 
 // The same over random cases.

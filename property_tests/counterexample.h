@@ -1,5 +1,5 @@
-// A violation as data: what `cutproof fuzz` saves, what `cutproof replay` and the property tests run again. Data and
-// not a seed, because seeds change their meaning when generators do.
+// A violation as data: `cutproof fuzz` saves it, `cutproof replay` and the property tests run it again. It is no seed,
+// because seeds change their meaning when generators change.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -16,9 +16,9 @@ struct Counterexample {
   std::vector<Command> commands;  // a history of that case; empty: it is dissected from beginning to end
   std::string backend;            // on which it was found; empty: that is not known
   gpu::ThreadSchedule schedule;   // `simulated`: the choices that make it fail; empty: none were recorded
-  std::string found;              // what was wrong, for a person
+  std::string found;              // the failure, for a person
   uint64_t seed = 0;              // of the campaign
-  int64_t index = 0;              // of the case in it, before it was simplified
+  int64_t index = 0;              // of the case in it, before it was shrunk
 };
 
 // JSON, one line. The schedule is written as pairs [decision, choice] of the choices that are not 0.

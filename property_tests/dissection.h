@@ -29,7 +29,7 @@ struct CoverageClass {
   Occurs occurs = Occurs::always;
 };
 
-// What happened in a case.
+// Coverage classes of a case.
 inline constexpr std::array kCoverageClasses = {
     CoverageClass{"no particles"},
     CoverageClass{"one particle"},
@@ -95,7 +95,7 @@ inline constexpr auto kCoverageClassNames = [] {
 }();
 inline constexpr std::size_t kCoverageClassCount = kCoverageClassNames.size();
 using CaseCoverage = Coverage<kCoverageClassNames>;
-// How many of so many cases must be in a class, at least one; 0: none need be. `move`: whether their bodies do.
+// Required number of cases in a class, at least one; 0: none is required. `move`: whether the bodies move.
 int64_t least_count(const CoverageClass& wanted, int64_t cases, bool move);
 
 // Steps of moving bodies beside the reference's.
@@ -108,7 +108,7 @@ struct StepsCompared {
 };
 
 struct Judgement {
-  CaseCoverage coverage;  // 1 for what happened
+  CaseCoverage coverage;  // 1: the class occurred
   StepsCompared compared;
   harness::PropertySummaries properties;
   harness::StagesRun stages;
@@ -118,13 +118,13 @@ struct Judgement {
   double reference_seconds = 0;    // that the reference took for its stages
 };
 
-// What a backend made of one case: the run, and what of the contract it broke on the way.
+// A backend's run of one case, and its violations of the contract.
 struct CaseRun {
   harness::Trace trace;
   harness::Promises promises = harness::kPromisesOfRules;
   bool has_expanded = false;       // before the first state: an expansion has changed clusters
   std::optional<Verdict> failure;  // of the contract
-  // Of one step of a body that moves, drawn at random: what the backend has shown of its iterates.
+  // Shown iterates of one step of a moving body, drawn at random.
   int64_t probed = -1;  // which moment of the trace; -1: none
   oracles::ShownStep iterates;
 };
@@ -132,9 +132,9 @@ struct CaseRun {
 // Loads all cases at once and runs them to their ends, stage by stage as far as the backend can.
 std::vector<CaseRun> run_cases(Backend& backend, const std::vector<Instance>& loaded);
 
-// Has the run of one case judged, with the promises of its rules; and compares every stage with what the reference
-// makes of the same state (oracles/comparison/stage_comparison.h), the step only of a body that moves.
-// `thorough`: with CGAL's geometric check of every skin.
+// Judges the run of one case, with the promises of its rules, and compares every stage with the reference's answer to
+// the same state (oracles/comparison/stage_comparison.h). The step is compared only for a body that moves. `thorough`:
+// with CGAL's geometric check of every skin.
 Judgement judge_case(const Case& c, const Instance& loaded, const CaseRun& run, const std::string& backend,
                      bool thorough);
 

@@ -1,6 +1,5 @@
-// A history: one random body to which commands are given, one after the other. Between any two stages it may be saved
-// and loaded, kicked, or get another stroke to cut; all that a backend promises has to hold all the same
-// (architecture.md, Properties).
+// A history: one random body and a sequence of commands. Between any two stages it may be saved and loaded, kicked, or
+// get another stroke; all promises of the backend must still hold (architecture.md, Properties).
 #pragma once
 #include <array>
 #include <cstdint>
@@ -53,7 +52,7 @@ struct Position {
 };
 Position after(Position at, const Command& command);
 
-// What happened in histories.
+// Coverage classes of histories.
 inline constexpr std::array<const char*, 13> kHistoryClassNames = {
     "load between frames",
     "load before detect",
@@ -84,7 +83,7 @@ class History {
  public:
   using Source = std::function<std::unique_ptr<Backend>()>;
   // Loads the case. Requires one stroke a frame (Case::together): a stroke that is added later takes a frame of its
-  // own. `keeps_moments`: for somebody to look at. Throws std::invalid_argument.
+  // own. `keeps_moments`: for pages. Throws std::invalid_argument.
   History(Source make, Case c, bool keeps_moments = false);
 
   // Does nothing once there is a failure. Throws what backends throw.

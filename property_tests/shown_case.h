@@ -1,4 +1,4 @@
-// A case run alone, with every state kept, for somebody to look at.
+// A case run alone, with every state kept, for pages.
 #pragma once
 #include <functional>
 #include <memory>
@@ -23,9 +23,9 @@ ShownCase run_to_show(const std::function<std::unique_ptr<Backend>()>& make, con
 ShownCase run_to_show(const std::function<std::unique_ptr<Backend>()>& make, const Case& c,
                       const std::vector<Command>& commands);
 
-// What a case is, in a few words: "12 particles, boxes of 5 nodes, 2 strokes, ...".
+// A case in a few words: "12 particles, boxes of 5 nodes, 2 strokes, ...".
 std::string in_words(const Case& c);
-// What a history does, in order: "2 stages, then a kick, then ...".
+// The commands of a history, in order: "2 stages, then a kick, then ...".
 std::string in_words(const std::vector<Command>& commands);
 
 }  // namespace cutproof::property_tests

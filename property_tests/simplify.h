@@ -11,11 +11,11 @@ namespace cutproof::property_tests {
 
 struct Simplified {
   Counterexample counterexample;
-  Verdict verdict;     // what fails now
-  bool alone = false;  // fails without the other bodies of its load
+  Verdict verdict;     // the failure of the shrunk case
+  bool alone = false;  // fails without the other bodies of its batch
 };
-// The simplest case, and under a chosen schedule the fewest preemptions, that still fail; as far as this time reaches
-// [s], or until it is asked to stop. What is tried last is tried to its end. 0: the case as it was drawn.
+// The simplest failing case, and under a chosen schedule the fewest failing preemptions, found within this time [s] or
+// until a stop is asked. The last attempt is completed. 0: the case as drawn.
 Simplified simplify(const Violation& violation, const harness::BackendChoice& choice, double seconds,
                     const StopAsked& stop_asked = {});
 

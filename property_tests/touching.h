@@ -1,5 +1,5 @@
-// What a step of a moving body touched: computed from the states around it and from the setup, so that no backend says
-// of itself what it was tested with.
+// Contacts of a step of a moving body: computed from the states around the step and from the setup, so that coverage
+// does not depend on a backend's word.
 #pragma once
 #include "model/setup.h"
 #include "model/state.h"
@@ -8,7 +8,7 @@ namespace cutproof::property_tests {
 
 // Each: whether there is such a particle when the last substep of the frame ends.
 struct Touches {
-  // The plate of the blade is rounded: what touches it is at the distance ρ from its rectangle (model/setup.h).
+  // The plate of the blade is rounded: touching particles are at the distance ρ from its rectangle (model/setup.h).
   bool blade_face = false;    // over the rectangle
   bool blade_rim = false;     // beyond a side of the rectangle, nearer to its plane than ρ
   bool blade_side = false;    // beyond one of the two sides along the depth, or right over it

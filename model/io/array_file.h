@@ -8,7 +8,7 @@
 
 namespace cutproof::io {
 
-// What no number says. A list of texts is read as one, its entries joined by spaces.
+// Texts of the file. A list of texts is read as one, its entries joined by spaces.
 struct NamedText {
   std::string name;
   std::string text;
@@ -32,16 +32,16 @@ const std::string* find_text(const ArrayFile& contents, std::string_view name);
 bool is_array_file(const std::string& path);
 
 // NPZ or HDF5, told apart by how the file begins. Truth values, int8 and uint8 become u8; other integers i32 where
-// every value fits, int64 i64 always. What lies in Fortran's order or big endian is turned round. Throws InputError,
-// naming file, array, problem and remedy, for half precision and for anything that is not a file of arrays within the
-// limits (model/io/limits.h), before anything large is allocated. Texts of HDF5 are string datasets, attributes of the
-// root group, or what MATLAB calls char.
+// every value fits, int64 i64 always. Fortran order and big-endian numbers are converted. Throws InputError, naming
+// file, array, problem and remedy, for half precision and for anything that is not a file of arrays within the limits
+// (model/io/limits.h), before anything large is allocated. Texts of HDF5 are string datasets, attributes of the root
+// group, or what MATLAB calls char.
 ArrayFile read_array_file(const std::string& path);
 
-// NPZ if the name ends in ".npz", else HDF5. The file is whole or not there, and the same for the same contents. Throws
-// InputError if the folder is not there or not writable, MachineError if the disk fails; std::invalid_argument if a
-// name is empty, too long, twice there or holds a '/' or a NUL, if a text is not ASCII, or if an array's bytes do not
-// fit its shape.
+// NPZ if the name ends in ".npz", else HDF5. The file is complete or absent, and the same contents give the same bytes.
+// Throws InputError if the folder does not exist or is not writable; MachineError if the disk fails;
+// std::invalid_argument if a name is empty, too long, twice there or holds a '/' or a NUL, if a text is not ASCII, or
+// if an array's bytes do not fit its shape.
 void write_array_file(const std::string& path, const ArrayFile& contents);
 
 }  // namespace cutproof::io

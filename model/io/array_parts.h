@@ -1,4 +1,4 @@
-// What reading NPZ and HDF5 shares. Internal to model/io/.
+// Shared code of reading NPZ and HDF5. Internal to model/io/.
 #pragma once
 #include <algorithm>
 #include <string>
@@ -22,14 +22,14 @@ struct RawNumbers {
 // As one of the five types of model/arrays.h. Throws InputError if a value fits none.
 Array array_of(std::string name, RawNumbers raw, const std::string& file);
 
-// In single precision's bounds right numbers would fail; in bounds of its own, half a spacing wide a thousand spacings
-// from the origin, little that is wrong would.
+// Half precision is refused. Correct numbers would fail the bounds of single precision. Bounds of half precision, half
+// a spacing wide at a thousand spacings from the origin, would reject little.
 [[noreturn]] void refuse_half_precision(const std::string& file, const std::string& name);
 
 // Adds to what was read. Throws InputError if the name is taken, if it is no plain name, or if the limits are exceeded.
 class ArrayCollector {
  public:
-  // Bytes of a number: whoever reads some makes numbers of 64 bits of them.
+  // Bytes of a number in memory: readers convert to 64 bits.
   static constexpr uint64_t kReadAs = 8;
   ArrayCollector(std::string file, uint64_t file_bytes) : file_(std::move(file)), file_bytes_(file_bytes) {}
   // Before an array of that size is allocated; `each`: bytes of one of its numbers.

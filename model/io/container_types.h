@@ -1,4 +1,4 @@
-// Which types are containers, for what goes through fields of any type.
+// Which types are containers, for visitors of fields of any type.
 #pragma once
 #include <optional>
 #include <vector>

@@ -17,7 +17,7 @@
 
 namespace cutproof::io::hdf5 {
 
-// HDF5 refused, or what it holds is not what was asked for. The callers know whether that is bad input or a failing
+// HDF5 failed, or the file does not have the requested content. Callers know whether this is bad input or a failing
 // machine, and translate.
 class Error : public std::runtime_error {
  public:
@@ -41,7 +41,7 @@ class Quiet {
   void* data_ = nullptr;
 };
 
-// What may still be read whole out of files of so many bytes: most_inflated() of them.
+// Bytes that may still be read from files of this size: most_inflated() of it.
 class InflationBudget {
  public:
   InflationBudget() = default;
@@ -54,8 +54,7 @@ class InflationBudget {
   uint64_t file_bytes_ = 0, left_ = 0;
 };
 
-// Gives back the memory that is held for closing what is open. To be called before that is done, once nothing else will
-// be.
+// Releases the memory reserved for closing handles. Call before closing, when only closing is left to do.
 void release_memory();
 
 // Owns one HDF5 identifier.
@@ -113,7 +112,7 @@ class File {
   static File create(const std::string& path);
   static File open(const std::string& path);
   hid_t id() const { return id_.get(); }
-  // Bytes of an opened file: an upper bound for what its tables can sensibly hold.
+  // Bytes of an opened file: an upper bound for the contents of its tables.
   uint64_t bytes() const { return bytes_; }
   void close();
 
@@ -174,8 +173,8 @@ class Table {
 // --- What others wrote: datasets and texts of any name, of any shape and of any type of number
 // ------------------------
 
-// Names of what lies in a group, ascending. Throws Error if there is more than `most`, or if a link leads elsewhere (a
-// soft or an external one, or one of a kind that somebody made up).
+// Names of the objects in a group, ascending. Throws Error if there are more than `most`, or if a link leads elsewhere
+// (a soft, external or user-defined one).
 std::vector<std::string> names_in(hid_t group, std::size_t most);
 std::vector<std::string> attribute_names(hid_t object, std::size_t most);
 

@@ -12,7 +12,7 @@
 
 namespace cutproof {
 
-// JSON has no NaN and no infinity; they are written as the words that a reader can tell from a number. What is absent
+// JSON has no NaN and no infinity; they are written as the words that a reader can tell from a number. An absent number
 // is null.
 inline nlohmann::json json_number(double value) {
   if (std::isnan(value)) return "nan";

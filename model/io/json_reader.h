@@ -10,8 +10,8 @@ namespace cutproof::io {
 
 // Throws InputError, naming `file` (and line and column, or the field), for what is not valid JSON in UTF-8, goes
 // beyond the limits, names a field of one object twice (JSON libraries let that pass, and then one of the two is lost),
-// or has a number that is not finite. Limits are checked before the tree is made. `remedy`: what to do where this is no
-// JSON at all, as a sentence.
+// or has a number that is not finite. Limits are checked before the tree is made. `remedy`: the remedy if the file is
+// not JSON at all, as a sentence.
 nlohmann::json parse_json(const std::string& text, const std::string& file, const JsonLimits& limits,
                           const std::string& remedy);
 // The same of a file.

@@ -9,8 +9,8 @@ namespace cutproof::io {
 
 enum class JunitOutcome {
   passed,
-  failed,   // what was judged does not hold
-  skipped,  // there was nothing to judge, or nobody vouches for it
+  failed,   // the judged property does not hold
+  skipped,  // there was nothing to judge, or the property is not promised
   error     // it could not be judged
 };
 
@@ -18,7 +18,7 @@ struct JunitCase {
   std::string name, class_name;
   double seconds = 0;
   JunitOutcome outcome = JunitOutcome::passed;
-  std::string message = {};  // one line: why it did not pass; nothing of what passed
+  std::string message = {};  // one line: why the case did not pass; empty if it passed
   std::string text = {};     // the whole story, and how to see it again
 };
 
@@ -30,8 +30,8 @@ struct JunitSuite {
 };
 
 // A document in UTF-8: <testsuites> of <testsuite> of <properties> and <testcase>, with the attributes tests, failures,
-// errors, skipped and time of each suite and of all. What XML 1.0 cannot hold (control characters, bytes that are not
-// UTF-8) is replaced by U+FFFD.
+// errors, skipped and time of each suite and of all. Characters that XML 1.0 excludes (control characters, bytes that
+// are not UTF-8) are replaced by U+FFFD.
 std::string junit_xml(const std::vector<JunitSuite>& suites);
 
 }  // namespace cutproof::io

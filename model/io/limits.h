@@ -1,6 +1,6 @@
-// How much is read of what comes from outside: each limit once. docs/reference/limits.md is made from these.
-// Within the limits, reading takes seconds and some hundred megabytes at most; beyond them it is refused before that
-// much is allocated. (Arrays and meshes take what they hold.)
+// Limits of input from outside. docs/reference/limits.md is made from these. Within the limits, reading takes seconds
+// and some hundred megabytes at most; beyond them it is refused before that much is allocated. (Arrays and meshes take
+// what they hold.)
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -62,7 +62,7 @@ inline constexpr int64_t kMostPatches = 10'000;  // of a blade's sweep in a fram
 // Of a recording.
 inline constexpr int64_t kMostSnapshots = 1'000'000;
 
-// What is compressed becomes larger when it is read. Little may become anything; what is more than this may be so many
+// Compressed data become larger when read. Up to this size, any ratio is accepted; beyond it, data may be this many
 // times as large as the file.
 inline constexpr uint64_t kFreeInflation = 256 * kMiB;
 inline constexpr uint64_t kMostInflation = 100;
@@ -75,7 +75,7 @@ constexpr uint64_t most_inflated(uint64_t file_bytes) {
 
 // "4 MiB", "300 bytes".
 std::string bytes_text(uint64_t bytes);
-// docs/reference/limits.md: every limit, and what is no file to be read.
+// docs/reference/limits.md: every limit, and refused kinds of files.
 std::string limits_reference();
 
 }  // namespace cutproof::io

@@ -14,12 +14,11 @@
 
 namespace cutproof::io {
 
-// What is written, and all that is read.
+// The only version that is written and read.
 inline constexpr int32_t kFormatVersion = 8;
 
-// One moment of one body: the state after a span of stages. Who records a run keeps one after each stage that was due
-// and at the end of each frame; who looks on from farther off may keep the ends of frames alone. Snapshot 0 is the
-// state as loaded (stage: skin).
+// One moment of one body: the state after a span of stages. A full recording has one after each due stage and at the
+// end of each frame; a short one may have the ends of frames alone. Snapshot 0 is the state as loaded (stage: skin).
 struct Snapshot {
   Stage stage = Stage::skin;
   State state;
@@ -34,8 +33,8 @@ struct RecordingPaths {
 };
 RecordingPaths recording_paths(const std::string& name);
 
-// Writes as it goes, to temporary names; finish() renames all of them, the index last, and without it nothing is left
-// behind. What did not change since the snapshot before is stored once. One recorder holds one body.
+// Writes to temporary names; finish() renames all of them, the index last. Without finish() no file is left. Fields
+// that did not change from the previous snapshot are stored once. One recorder records one body.
 class Recorder {
  public:
   // scene_json and backend are kept as they are. `left_to_reference`: as Recording has it. `frames_asked`: the run was

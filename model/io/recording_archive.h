@@ -1,6 +1,5 @@
-// One description of what a recording's index holds, walked by a writer or by a reader, so that the two cannot drift
-// apart: archive(name, value) for each field once. Single values, names and texts lie in the file as attributes,
-// arrays as datasets.
+// One description of a recording's index, used by the writer and the reader: archive(name, value) for each field once.
+// Single values, names and texts lie in the file as attributes, arrays as datasets.
 #pragma once
 #include <fmt/format.h>
 
@@ -118,7 +117,7 @@ class ReadingArchive {
   hdf5::InflationBudget& budget_;
 };
 
-// What is read has to fit together; `field` is its full path. These throw hdf5::Error.
+// Consistency of the data read; `field` is the full path. These throw hdf5::Error.
 inline void require_offsets(const std::string& field, const std::vector<int64_t>& offsets, std::size_t values) {
   if (offsets.empty() || offsets.front() != 0 || !std::is_sorted(offsets.begin(), offsets.end()) ||
       offsets.back() != static_cast<int64_t>(values)) {

@@ -1,5 +1,5 @@
-// What the recorder and the reader of recordings must agree on (docs/reference/recording.md). Where each field of a
-// State lies follows from model/fields.h.
+// The format that the recorder and the reader of recordings share (docs/reference/recording.md). The place of each
+// field of a State follows from model/fields.h.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -17,7 +17,7 @@ namespace cutproof::io {
 
 inline constexpr std::string_view kIndexSuffix = ".cutproof.h5";
 
-// What stands in the root attribute cutproof_file of each of the four files.
+// Values of the root attribute cutproof_file of the four files.
 inline constexpr const char* kIndexKind = "recording index";
 inline constexpr const char* kParticlesKind = "recording particles";
 inline constexpr const char* kSkinKind = "recording skin";

@@ -13,7 +13,7 @@
 
 namespace cutproof::io {
 
-// Both throw hdf5::Error; what is read is not yet checked by defect_of.
+// Both throw hdf5::Error. Reading does not check the setup by defect_of.
 void write_setup(hid_t file, const Setup& setup);
 Setup read_setup(hid_t file, hdf5::InflationBudget& budget);
 

@@ -23,14 +23,14 @@ class RunSegments {
   static RunSegments of(const std::string& path);
   // Requires has_segments(path). Throws InputError if there is no segment, or if one between others is missing.
   explicit RunSegments(std::string path);
-  // Those that are in memory; `source`: what errors name.
+  // Segments in memory; `source`: the name in errors.
   RunSegments(std::string source, std::vector<ArrayFile> segments)
       : source_(std::move(source)), in_memory_(std::move(segments)) {}
 
   // The next one, or nothing after the last; the first with what is given once per run. Throws what read_array_file
   // throws, and InputError if all so far have become more than files of their size may.
   std::optional<ArrayFile> next();
-  // What errors name: the file of the last segment, or its group in the file.
+  // The name in errors: the file of the last segment, or its group in the file.
   const std::string& source() const { return source_; }
 
  private:

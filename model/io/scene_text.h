@@ -1,4 +1,4 @@
-// What reading, writing and documenting scenes have in common: kinds of fields, and their names and numbers as text.
+// Shared code of reading, writing and documenting scenes: kinds of fields, and their names and numbers as text.
 #pragma once
 #include <fmt/format.h>
 

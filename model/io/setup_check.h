@@ -1,4 +1,4 @@
-// Whether a setup can be used: what a file, or another program, has given.
+// Whether a setup from a file or from another program can be used.
 #pragma once
 #include <optional>
 #include <string>
@@ -7,8 +7,7 @@
 
 namespace cutproof::io {
 
-// The first thing that makes a setup unusable: a field by its group and name ("step/substeps"), and what is wrong, as a
-// sentence.
+// The first defect of a setup: a field by its group and name ("step/substeps"), and a sentence.
 struct SetupDefect {
   std::string field;
   std::string problem;

@@ -1,4 +1,4 @@
-// What the files for ParaView show of a run: the recorder writes it, and the reader computes it again.
+// Contents of the files for ParaView: the recorder writes them, and the reader computes them again.
 #pragma once
 #include <array>
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Files that are not to outlive what writes them, whatever ends it: an error, a signal, a kill.
+// Files that must not outlive their writer, whatever ends it: an error, a signal, a kill.
 #pragma once
 #include <atomic>
 #include <filesystem>
@@ -28,12 +28,12 @@ class Unfinished {
   Unfinished *previous_ = nullptr, *next_ = nullptr;  // of all that live
 };
 
-// Where what will be `path` is written: beside it, as ".NAME.PID-NUMBER-MACHINE.tmp". Two processes, and two writers in
-// one process, never share a name.
+// Temporary name of `path`, beside it: ".NAME.PID-NUMBER-MACHINE.tmp". Two processes, and two writers in one process,
+// never share a name.
 std::string unfinished_name(const std::filesystem::path& path);
 // Removes what processes that were killed, or lost their power, have left in a folder: files of such names whose
-// process does not live, on this machine (and among the processes that this one sees). Others stay, and what cannot be
-// removed.
+// process does not live, on this machine (and among the processes that this one sees). Other files stay, and those that
+// cannot be removed.
 void remove_left_behind(const std::filesystem::path& folder);
 
 }  // namespace cutproof::io

@@ -1,6 +1,6 @@
-// Writes one temporal VTKHDF 2.0 file of type PolyData: points, one kind of cells, and data on the points, for each
-// of a growing number of steps. What did not change is written once and shared by steps through offsets.
-// Layout: docs/reference/recording.md, and https://docs.vtk.org, VTKHDF File Format.
+// Writes one temporal VTKHDF 2.0 file of type PolyData: points, one kind of cells, and data on the points, for each of
+// a growing number of steps. Unchanged data are written once and shared by steps through offsets. Layout:
+// docs/reference/recording.md, and https://docs.vtk.org, VTKHDF File Format.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -59,7 +59,7 @@ class PolyDataFile {
   std::vector<int64_t> points_of_, cells_of_, connectivity_of_, first_cell_, first_connectivity_;
 };
 
-// What a step of such a file has to show, as whoever reads it knows from elsewhere.
+// Expected contents of a step of such a file, known from the index.
 struct ShownStep {
   double time = 0;                   // [s]
   int64_t points = 0, cells = 0;     // of the step's part

@@ -11,7 +11,7 @@
 
 namespace cutproof::io {
 
-// What is wrong with an archive: "its directory is damaged".
+// The defect of an archive: "its directory is damaged".
 struct DamagedArchive : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -40,10 +40,10 @@ class ZipReader {
   uint64_t count() const { return count_; }
   // As the directory says, which takes memory by their number.
   std::vector<ZipEntry> entries();
-  // What is read next is this entry of `entries()`.
+  // Starts reading this entry of `entries()`.
   void open(const ZipEntry& entry);
-  // The next bytes of it: as many as are asked for, or all that are left. Fewer are given only if the entry was whole
-  // and had its check sum.
+  // The next bytes of the entry: as many as requested, or the rest. The rest is given only if the entry is complete and
+  // its check sum is right.
   std::size_t read(void* to, std::size_t bytes);
 
  private:
