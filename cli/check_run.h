@@ -1,4 +1,4 @@
-// `cutproof check` of a run of somebody else's simulator.
+// `cutproof check` of a run of another simulator.
 #pragma once
 #include "cli/check_state.h"
 #include "model/io/run_segments.h"

@@ -1,4 +1,4 @@
-// `cutproof check` of a file of arrays: one state that somebody else's simulator wrote.
+// `cutproof check` of a file of arrays: one state of another simulator.
 #pragma once
 #include <chrono>
 #include <nlohmann/json.hpp>

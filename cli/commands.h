@@ -1,5 +1,5 @@
-// The verbs of the program `cutproof`. Each has a file: it declares the options, calls the library, prints what comes
-// back.
+// The subcommands of the program `cutproof`. Each has a file that declares the options, calls the library and prints
+// the results.
 #pragma once
 #include <functional>
 
@@ -14,7 +14,7 @@ namespace cutproof::cli {
 // guests::CannotRunHere (status 77, which CTest and others take for skipped); main() turns them into these.
 using Work = std::function<int()>;
 
-// Each adds a verb to `program`, and sets `work` if the command line names it.
+// Each adds a subcommand to `program`, and sets `work` if the command line names the subcommand.
 void add_run(CLI::App& program, Work& work);
 void add_check(CLI::App& program, Work& work);
 void add_kick(CLI::App& program, Work& work);

@@ -1,4 +1,4 @@
-// --report F of verbs that write a document with --json, and pages of such documents.
+// --report F of subcommands that write a document with --json, and pages of such documents.
 #pragma once
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -14,8 +14,8 @@ namespace cutproof::cli {
 void write_document_report(const std::string& path, const nlohmann::json& document, const report::Made& made,
                            const std::optional<harness::BackendChoice>& own_backend = std::nullopt);
 
-// `document`: of fuzz, judge, bench or tune, as its verb has made it or as `file` holds it. `file` is empty for the
-// former; in it the counterexamples are looked for where it says, then beside it.
+// `document`: of fuzz, judge, bench or tune, from its subcommand or from `file`. `file` is empty for the former.
+// Counterexamples of a file are searched at their given paths, then beside the file.
 struct DocumentPage {
   std::string text;
   std::optional<bool> holds;  // nothing: it judges nothing

@@ -40,7 +40,7 @@ std::string what_was_found(const Verdict& verdict, const Judging& judging) {
   return verdict.witness.text.empty() ? in_full(verdict, judging) : verdict.witness.text;
 }
 
-// Of the case that its command shows: the simplified one, where there is one.
+// Of the case that its command shows: the shrunk one, where there is one.
 const json& as_it_is_shown(const json& violation) {
   const auto simplified = violation.find("simplified");
   return simplified != violation.end() && simplified->contains("text") ? *simplified : violation;

@@ -24,7 +24,7 @@ struct Judging {
   std::string suite;       // such as "cutproof run"
   std::string class_name;  // of its cases: class_of()
   std::string again;       // a command line
-  // What verdicts are of: frames that have stages, frames of somebody else's run, or one state.
+  // Subject of verdicts: frames with stages, frames of another simulator's run, or one state.
   enum class Of : uint8_t { stages, frames, state } of = Of::stages;
   bool in_stages() const { return of == Of::stages; }
 };

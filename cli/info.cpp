@@ -112,7 +112,7 @@ void print_words() {
   line("operations (vectors)", operations);
 }
 
-// Of the page: today, or what whoever builds it again wants (reproducible-builds.org).
+// Date of the page: today, or the date of a reproducible build (reproducible-builds.org).
 std::string date_of_build() {
   const char* const given = std::getenv("SOURCE_DATE_EPOCH");
   const std::time_t time =

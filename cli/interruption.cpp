@@ -21,7 +21,7 @@ std::atomic<bool> ends_in_order = false;
 std::atomic<int> asking_signal = 0;  // the signal
 static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 
-// By the signal itself, so that whoever waits sees what it was.
+// By the signal itself, so that the waiting process sees the signal.
 [[noreturn]] void end_by(int signal) noexcept {
   io::Unfinished::remove_all();
   const rlimit none = {0, 0};
@@ -46,7 +46,7 @@ void on_signal(int signal) {
   if (!ends_in_order) end_by(signal);
   int none = 0;
   const bool is_first = asking_signal.compare_exchange_strong(none, signal);
-  // Each further line for a reader who is gone brings another PIPE: nobody has asked again.
+  // Each further line for a closed reader brings another PIPE, which is no second request.
   if (!is_first && signal != SIGPIPE) end_by(signal);
   if (is_first && signal != SIGPIPE) say_that_it_stops();
   errno = before;
@@ -71,7 +71,7 @@ void handle_signals() {
 
 EndsInOrder::EndsInOrder() { ends_in_order = true; }
 EndsInOrder::~EndsInOrder() {
-  // What has asked is answered by whoever finds it so; what comes now ends at once.
+  // The caller handles an earlier request; a later signal ends the program at once.
   ends_in_order = false;
 }
 

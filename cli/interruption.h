@@ -1,14 +1,14 @@
-// Signals that ask the program to end: INT, TERM, HUP, QUIT, and PIPE, where nobody reads what it prints any more.
+// Signals that ask the program to end: INT, TERM, HUP, QUIT, and PIPE, after the reader of the output has closed.
 //
-// No signal leaves a file half written (io::Unfinished). A verb that can end in order says so: the first signal then
-// only asks, and the verb writes what it has; the second ends it at once. Every other verb ends at once. Either way the
-// program ends by that signal, which a shell reports as 128 + its number. A limit on the size of files (XFSZ) is an
-// error of writing, as a full disk is.
+// No signal leaves a file half written (io::Unfinished). A subcommand may declare that it can end in order: the first
+// signal then is a request, and the subcommand writes its results so far; the second ends it at once. Every other
+// subcommand ends at once. Either way the program ends by that signal, which a shell reports as 128 + its number. A
+// limit on the size of files (XFSZ) is an error of writing, as a full disk is.
 #pragma once
 
 namespace cutproof::cli {
 
-// To be called once, before anything else. A signal that whoever started the program has it ignore, as nohup does with
+// To be called once, before anything else. A signal that the program's parent has set to be ignored, as nohup does with
 // HUP, stays ignored.
 void handle_signals();
 

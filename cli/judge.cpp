@@ -1,4 +1,4 @@
-// `cutproof judge`: somebody's own kernels, from a shared library.
+// `cutproof judge`: the user's kernels, from a shared library.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 

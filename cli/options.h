@@ -1,4 +1,4 @@
-// Options that several verbs have.
+// Options of several subcommands.
 #pragma once
 #include <CLI/CLI.hpp>
 #include <string>
@@ -11,8 +11,8 @@ namespace cutproof::cli {
 
 // Throws InputError for an option of the command line.
 [[noreturn]] void refuse(const std::string& option, const std::string& problem, const std::string& remedy);
-// Refuses what was given but is empty, such as --json "": nobody means that. So it is with line ends: a file whose name
-// has one would print lines that look like ours.
+// Refuses empty values, such as --json "", and values with line ends: a file name with one would print lines that look
+// like output of this program.
 void refuse_odd_words(const CLI::App& command);
 
 // --backend alone. `what`: what it does, for the help, which lists those of which `offered` holds.
@@ -54,7 +54,7 @@ CLI::Option* add_check_depth(CLI::App& command, std::string& asked, const std::s
 // Throws InputError if there is no depth of this name.
 harness::Depth depth_asked(const std::string& asked);
 
-// --junit F, for a verb that judges.
+// --junit F, for a subcommand that judges.
 void add_junit(CLI::App& command, std::string& path);
 
 // A word as a shell takes it.

@@ -92,7 +92,7 @@ void write_output(const std::string& path, const std::string& text) {
     const ssize_t more = write(document_file, text.data() + written, text.size() - written);
     if (more > 0) written += static_cast<std::size_t>(more);
     if (more >= 0 || errno == EINTR) continue;
-    if (errno == EPIPE && stop_asked()) return;  // nobody reads it any more
+    if (errno == EPIPE && stop_asked()) return;  // the reader has closed
     throw MachineError(std::string("standard output cannot be written to: ") + std::strerror(errno));
   }
 }

@@ -6,8 +6,8 @@
 
 namespace cutproof::cli {
 
-// Hands what was printed to the system. Throws MachineError if it, or anything before it, cannot be written; but not
-// where nobody reads it any more: that asks to stop (interruption.h).
+// Flushes printed output to the system. Throws MachineError if this or earlier output cannot be written. A closed
+// reader is no error: it asks to stop (interruption.h).
 void flush_output();
 
 // With what the output of every suite and of `tune` begins, of the head of its document (io::filled).

@@ -39,7 +39,7 @@ std::string elapsed_and_remaining(double elapsed, std::optional<double> remainin
 
 class Progress {
  public:
-  // Of `total` things of this name; 0: nobody knows how many there will be.
+  // Of `total` things of this name; 0: the number is not known.
   Progress(std::string thing, int64_t total);
   ~Progress();
   Progress(const Progress&) = delete;

@@ -34,7 +34,7 @@ std::vector<std::string> names_of(const CLI::Option& option) {
   return names;
 }
 
-// Calls `visit` with the program, each verb and each suite, and its name: "", "run", "bench solver".
+// Calls `visit` with the program, each subcommand and each suite, and its name: "", "run", "bench solver".
 void for_each_command(const CLI::App& command, const std::string& name,
                       const std::function<void(const CLI::App&, const std::string&)>& visit) {
   visit(command, name);

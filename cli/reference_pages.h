@@ -5,7 +5,7 @@
 
 namespace cutproof::cli {
 
-// A script for a shell: verbs, suites, options, words that an option knows, files and folders.
+// A script for a shell: subcommands, suites, options, values of an option, files and folders.
 std::string bash_completion(const CLI::App& program);
 std::string zsh_completion(const CLI::App& program);
 std::string fish_completion(const CLI::App& program);

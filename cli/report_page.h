@@ -1,4 +1,4 @@
-// --report F, for verbs that run or judge a recording.
+// --report F, for subcommands that run or judge a recording.
 #pragma once
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>

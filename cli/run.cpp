@@ -147,7 +147,7 @@ void print_summary(const RunResult& result) {
       result.clusters_at_start, clusters);
 }
 
-// Of a run that somebody stopped; empty of every other.
+// Of a stopped run; empty for every other.
 std::string how_far(const RunSession& session, const fixtures::Built& built) {
   if (!session.is_stopped()) return "";
   return fmt::format("it was stopped after {} of {} frames", session.frames().size(), built.setup.frame_count());
@@ -202,7 +202,7 @@ fixtures::BuildOptions build_options_of(const RunOptions& options) {
   return build_options;
 }
 
-// As it is kept in a recording, where nobody reads the mesh again.
+// As kept in a recording, for which the mesh is not read again.
 std::string recorded_scene(Scene scene, const std::optional<MeshSpec>& mesh) {
   if (mesh) {
     scene.body.shape.reset();
@@ -470,7 +470,7 @@ void add_run(CLI::App& program, Work& work) {
   add_baseline(*command, options->baseline);
   command->callback([options, command, &work] {
     options->again = as_given(*command);
-    // Whoever writes --check before the scene means no depth by it.
+    // --check before the scene has no depth.
     if (options->scene.file.empty() && !options->check.empty() && !harness::depth_named(options->check)) {
       options->scene.file = std::exchange(options->check, std::string(name_of(harness::Depth::motion)));
     }

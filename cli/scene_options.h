@@ -1,4 +1,4 @@
-// A scene on the command line, and what of it is to be otherwise: of every verb that takes one.
+// A scene on the command line, and changes of it, for every subcommand that takes a scene.
 #pragma once
 #include <CLI/CLI.hpp>
 #include <cstdint>

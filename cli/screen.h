@@ -1,5 +1,5 @@
-// What this program prints, in lines of at most 80 columns, and how: in colour, and how much of it.
-// There is one standard output in a process, so there is one style, which main() sets before a verb begins.
+// Printed output, in lines of at most 80 columns: its colour and amount. A process has one standard output, so there is
+// one style, which main() sets before a subcommand begins.
 #pragma once
 #include <fmt/format.h>
 
@@ -30,7 +30,7 @@ struct AskedStyle {
   bool quiet = false, verbose = false;
 };
 inline constexpr const char* kStyleGroup = "Output";  // in which their help lists them
-// --color, --quiet and --verbose of the program and of each of its verbs and suites.
+// --color, --quiet and --verbose of the program and of each subcommand and suite.
 void add_style(CLI::App& program, AskedStyle& asked);
 // Colour on a terminal that knows it (TERM), unless NO_COLOR holds anything (https://no-color.org); --color decides
 // before both.

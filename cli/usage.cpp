@@ -13,7 +13,7 @@ namespace cutproof::cli {
 
 namespace {
 
-// The innermost verb or suite that the command line names.
+// The innermost subcommand or suite that the command line names.
 const CLI::App& named_command(const CLI::App& program) {
   const CLI::App* command = &program;
   while (!command->get_subcommands().empty()) command = command->get_subcommands().front();

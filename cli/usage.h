@@ -6,11 +6,11 @@
 
 namespace cutproof::cli {
 
-// In words, with a remedy: for a verb or an option that does not exist the nearest one that does. `words`: of the
-// command line, without the program.
+// In words, with a remedy: for an unknown subcommand or option the nearest known one. `words`: of the command line,
+// without the program.
 std::string usage_error(const CLI::App& program, const CLI::ParseError& error, const std::vector<std::string>& words);
 
-// Verbs and options that help tells of.
+// Subcommands and options that help lists.
 std::vector<const CLI::App*> shown_commands(const CLI::App& command);
 std::vector<const CLI::Option*> shown_options(const CLI::App& command);
 // Arguments without a name, in order.

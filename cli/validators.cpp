@@ -17,7 +17,7 @@ namespace cutproof::cli {
 
 namespace {
 
-// Of a validator's name, which nobody sees: behind it stand the words.
+// Of a validator's name, which is not printed: the words follow it.
 constexpr std::string_view kWords = "words:";
 
 std::string quoted_short(const std::string& given) {

@@ -1,5 +1,5 @@
-// Takes the place of bench and tune in a program that is built without them (-DCUTPROOF_BENCHMARKS=OFF): both verbs say
-// so, and help does not list them.
+// Replaces bench and tune in a program that is built without them (-DCUTPROOF_BENCHMARKS=OFF): both subcommands refuse,
+// and help does not list them.
 #include <CLI/CLI.hpp>
 #include <string>
 

@@ -165,9 +165,9 @@ void Guest::start() {
   if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0) machine_failed("a channel to a plugin");
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  // Only this process inherits these two: a file that is copied onto itself stays open in it. Were they open to others
-  // for a moment, a guest that another thread starts then would hold this one's end of the channel, and nobody would
-  // see that this one has ended.
+  // Only this process inherits these two: a file that is copied onto itself stays open in it. If they were open to
+  // others for a moment, a guest that another thread starts would hold this guest's end of the channel, and the end of
+  // this guest would stay unnoticed.
   const int their_channel = fcntl(ends[1], F_DUPFD_CLOEXEC, 100),
             their_file = fcntl(file_.number, F_DUPFD_CLOEXEC, 100);
   for (const int file : {their_channel, their_file}) posix_spawn_file_actions_adddup2(&actions, file, file);
@@ -290,7 +290,7 @@ std::string Guest::describe_fault(const wire::Fault& fault) const {
   return fmt::format(": it {} '{}', which is an input", what, array.name);
 }
 
-// Of a guest that is no longer there.
+// Of a guest that has ended.
 std::string Guest::why_it_ended() {
   if (attached_) return "the guest has closed its channel";
   int status = 0;

@@ -141,7 +141,7 @@ std::vector<RotationKnown> hand_back(const Origins& origins, const Clusters& end
     before.rotation[from] = end.rotation[c];
     before.degenerate[from] = end.degenerate[c];
   }
-  // One of several is shown, and nobody knows which.
+  // One of several is shown, and it is not known which.
   for (const std::vector<int32_t>& from : origins) {
     if (from.size() < 2) continue;
     const auto one =

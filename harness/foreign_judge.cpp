@@ -65,7 +65,7 @@ std::string why_not(const ForeignState& foreign, const oracles::Property& proper
   if (property.check_state == nullptr) return "one state does not show the effect of a stage";
   if (property.name == "no pass") return "a file of arrays has no blade";
   if (!foreign.promises.cover(property.name)) return "not promised";
-  // Rotations are taken before the positions that follow from them, so this goes without saying of nobody.
+  // Simulators take rotations before the positions that follow from them, so no default promises this.
   if (property.name == "best rotation" && !foreign.promises_given) return "not promised";
   if (std::string why = missing(foreign, property.name); !why.empty()) return why;
   if (property.name == "rest frames" && centers_hang_in_the_air(foreign)) return "the file has no rest or nodes";

@@ -71,8 +71,8 @@ class Reader {
   void see_type(const Array& array) {
     if (array.type == ElementType::f32) out_.state.precision = Precision::binary32;
   }
-  // Of what a simulator computes. Masses and velocities may be parameters, as short as anyone likes; places of rest
-  // come from meshes, whose files have single precision.
+  // Of computed arrays. Masses and velocities may be parameters with few digits; rest positions come from meshes, whose
+  // files have single precision.
   void see_precision(const Array& array) {
     see_type(array);
     if (array.type == ElementType::f32 || precision_of(array) != Precision::binary32) return;

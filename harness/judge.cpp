@@ -245,8 +245,8 @@ void Judge::see_several(const Moment& moment, const std::array<bool, 6>& seen) {
            "cluster " + std::to_string(number) + " has not the rotation of cluster " + from + ", from which it comes"});
     }
     if (!unique && sees(Stage::merge)) {
-      // Of the rule's answers the reference knows one. The split leaves one, and what was merged of it the oracle
-      // tells; where clusters have grown after that, or have lost their numbers at the frame's end, nobody does.
+      // The reference knows one of the rule's answers. The split has one answer, and the oracle identifies merged
+      // clusters. Clusters that have grown after that, or lost their numbers at the frame's end, cannot be identified.
       if (sees(Stage::expand) || sees(Stage::skin)) {
         verdict.undecided = end.clusters.count();
       } else {

@@ -57,7 +57,7 @@ bool fits_as_list(const Array& array, const Shape& wanted) {
   if (wanted.size() == 1 && array.shape.size() == 2 && std::min(array.shape[0], array.shape[1]) == 1) {
     return fits({array.count()}, wanted);
   }
-  // Of extents that may be any, whoever asks reads the array's: an empty list has the first alone.
+  // Callers read free extents from the array: an empty list has the first extent alone.
   return array.shape == Shape{0} && !wanted.empty() && wanted.front() <= 0 &&
          std::none_of(wanted.begin() + 1, wanted.end(), [](int64_t extent) { return extent < 0; });
 }

@@ -63,7 +63,7 @@ class RunSession {
   const io::RecordingReader* reference_recording() const { return reference_recording_.get(); }
   // Violations of the backend's contract; the judge has them too.
   const std::vector<Verdict>& broken_contracts() const { return broken_; }
-  // Stages that the backend cannot run, as far as anybody looked at them.
+  // Observed stages that the backend cannot run.
   std::vector<std::string> left_to_reference() const { return stages_.left(); }
   // Of all that was judged, compared and measured.
   bool holds() const;

@@ -14,9 +14,9 @@ namespace cutproof::oracles {
 
 class Judged;  // oracles/judged.h: a well-formed state and derived data
 
-// Whether the rotation that a step has left to a cluster is in the state after it. Where that was made from a later
-// one, in which clusters have changed, none of those may be known to have kept it; or none may come from it at all, and
-// then nobody is shown it.
+// Whether the rotation that a step has left to a cluster is in the state after it. If the state after the step was made
+// from a later one with other clusters, no cluster may be known to have kept this rotation, or none may come from this
+// cluster; then the rotation is not shown.
 enum class RotationKnown : uint8_t { no, yes, gone };
 
 // A stage that was run: the states before and after it, both well formed.

@@ -1,4 +1,4 @@
-// What is gone was cut: no particle died that nobody has taken out.
+// Only cut tissue is removed: every dead particle is listed as removed.
 #include <fmt/format.h>
 
 #include "oracles/checks.h"

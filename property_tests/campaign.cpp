@@ -68,7 +68,7 @@ struct Load {
   bool has_violation = false;
 };
 
-// Threads take what is most wanted of three jobs: to generate a load, to run one, to judge some cases of one.
+// Threads take the most urgent of three jobs: to generate a batch, to run one, to judge some cases of one.
 class Runner {
  public:
   Runner(const CampaignOptions& options, const BackendSource& source,
@@ -105,8 +105,8 @@ class Runner {
     try {
       while (!error_) {
         drop_what_nobody_wants();
-        // Where fewer loads can run than there are threads, a device must not wait for judges: one load is ready before
-        // a place is idle, and one may wait to be judged. Elsewhere a load is judged while the caches hold it.
+        // Where fewer batches can run than there are threads, a device must not wait for judges: one batch is ready
+        // before a place is idle, and one may wait to be judged. Elsewhere a batch is judged while the caches hold it.
         const std::size_t ahead = options_.backends < options_.threads ? 1 : 0;
         const bool may_begin = waiting_.size() <= ahead;
         if (may_begin && !ready_.empty() && !idle_.empty()) {
@@ -116,7 +116,7 @@ class Runner {
         } else if (!waiting_.empty()) {
           judge(lock);
         } else if (generating_ == 0 && running_ == 0 && ready_.empty()) {
-          break;  // whoever still judges makes no new work
+          break;  // threads that still judge make no new work
         } else {
           changed_.wait(lock);
         }
@@ -286,7 +286,7 @@ class Runner {
   std::exception_ptr error_;
 };
 
-// Beyond this the states of a load take gigabytes.
+// Beyond this the states of a batch take gigabytes.
 constexpr int64_t kMostBodiesInALoad = 1024, kMostMovingBodiesInALoad = 256;
 
 }  // namespace
@@ -319,13 +319,13 @@ void set_parallel_loads(CampaignOptions& options, const harness::BackendDescript
 int usual_batch(const CampaignOptions& options, const harness::BackendDescriptor& backend) {
   const int64_t least = backend.bodies_in_a_load;
   if (backend.particles_in_a_load == 0) return static_cast<int>(least);
-  constexpr int64_t kAsked = 80;  // as many as the sizes that take turns if nobody says which
+  constexpr int64_t kAsked = 80;  // as many as the sizes that alternate by default
   int64_t particles = 0;
   for (int64_t index = 0; index < kAsked; ++index) particles += std::ssize(case_at(options, index).nodes);
   const int64_t loads = std::max(backend.most_parallel_loads, 1);
   const int64_t most = std::max(least, (options.cases + loads - 1) / loads);
   const int64_t wanted = backend.particles_in_a_load * kAsked / std::max<int64_t>(particles, 1);
-  // A load of moving bodies takes as long as the one with most frames, and nobody judges before.
+  // A batch of moving bodies takes as long as the one with most frames, and judging begins after that.
   const int64_t at_once = options.dynamics ? kMostMovingBodiesInALoad : kMostBodiesInALoad;
   return static_cast<int>(std::clamp(wanted, least, std::min(most, at_once)));
 }

@@ -180,7 +180,7 @@ oracles::IterateProbe probe_of(const Instance& loaded, const CaseRun& run) {
   return {loaded.setup, *run.trace.moments[at(run.probed)].before, oracles::Iterates::sampled, probe_seed(loaded)};
 }
 
-// Has the backend show iterates of one step of each body that moves, all in one load.
+// Has the backend show iterates of one step of each moving body, all in one batch.
 void probe_steps(Backend& backend, const std::vector<Instance>& loaded, std::vector<CaseRun>& runs) {
   std::vector<oracles::IterateProbe> probes;
   std::vector<std::size_t> probed;

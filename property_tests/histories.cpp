@@ -256,7 +256,7 @@ void History::carry_out(const Kick& command) {
   load_both();
 }
 
-// Both bodies in one load, so that neither may disturb the other. Stages until the next step do not see velocities;
+// Both bodies in one batch, so that neither may disturb the other. Stages until the next step do not see velocities;
 // what that step moves may then be removed by the next detection. Later stages may differ: whether small clusters are
 // merged depends on whether anything at all was removed.
 void History::require_no_ghost_force(const State& kicked, const std::vector<int32_t>& component_of, int32_t component) {

@@ -309,7 +309,7 @@ TEST_P(EveryBackend, DissectsBodiesOfSizesAroundThoseOfBlocks) {
 class LargeBodies : public ::testing::TestWithParam<NamedBackend> {};
 
 // Wires beside each other, and a cluster for every 21 particles in a row. Cutting every third particle out makes far
-// more clusters than a load has room for; so the kernels' backends have to make room between frames.
+// more clusters than a batch has room for, so the kernels' backends have to make room between frames.
 TEST_P(LargeBodies, FindRoomForMoreClustersThanTheirLoadHadRoomFor) {
   constexpr int32_t kWires = 14, kLength = 90, kInARow = 21;  // kWires along each of two axes
   Case c;
@@ -364,8 +364,8 @@ INSTANTIATE_TEST_SUITE_P(Over, LargeBodies, ::testing::ValuesIn(backends_for_lar
 
 using Paths = std::vector<std::pair<std::string, std::unique_ptr<Backend>>>;
 
-// The same work, started in other ways. Eight bodies a load: what one needs is not what all need, and a small load is
-// not one small body. Each of two of them alone, too.
+// The same work, started in other ways. Eight bodies in a batch: their needs differ, and a small batch is not one small
+// body. Each of two of them alone, too.
 void expect_same_bits(const std::string& id, int64_t cases, Paths& paths) {
   constexpr int kBodies = 8;
   constexpr int64_t kFrames = 4;

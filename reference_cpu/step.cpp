@@ -212,7 +212,7 @@ void step(const Setup& setup, State& state) {
   state.removed.clear();
   state.debris.clear();
   state.impulse = {};
-  // Without iterations nobody asks who holds what.
+  // Without iterations containing clusters are not needed.
   const Memberships memberships =
       setup.step.iterations > 0 ? memberships_of(state.clusters, setup.body.particle_count()) : Memberships{};
   const double dt = setup.substep_length[at(state.frame)];

@@ -111,7 +111,7 @@ static int run(const cutproof_host* host, void* self, int, int, cutproof_state* 
   std::vector<uint8_t> degenerate;
   for (const Cluster& cluster :
        split(s, alive, get<int64_t>(state->offsets), old_members, get<int32_t>(state->number))) {
-    double t[3] = {0, 0, 0}, m = 0;  // each holder of a particle has an equal share of its mass
+    double t[3] = {0, 0, 0}, m = 0;  // each containing cluster has an equal share of a particle's mass
     for (const int32_t p : cluster.members) {
       for (int k = 0; k < 3; ++k) t[k] += s.mass[p] / holders[p] * s.rest[3 * p + k];
       m += s.mass[p] / holders[p];

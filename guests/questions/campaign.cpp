@@ -39,7 +39,7 @@ const Verdict* first_failure(const std::vector<Verdict>& verdicts, const harness
   return nullptr;
 }
 
-// A question of at most so many particles, or matrices, is saved as data, and simplified as such.
+// A question of at most so many particles, or matrices, is saved as data, and shrunk as such.
 constexpr int64_t kMostSaved = 2'048;
 
 // Of a failure: the smallest large question of its kind that fails in the same property, and then questions that are

@@ -1,4 +1,4 @@
-// A single kernel judged on many cases: asks a guest, judges what it answers, simplifies what fails.
+// A single kernel judged on many cases: asks a guest, judges the answers, shrinks failures.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -29,7 +29,7 @@ struct KernelCampaignOptions {
   double simplify = 20;                // [s] for each failure that is kept
   // After so many questions that were not answered at all the campaign ends; 0: never.
   int64_t most_lost = 10;
-  StopAsked stop_asked = {};  // asks no further question, and simplifies no further
+  StopAsked stop_asked = {};  // asks no further question, and shrinks no further
 };
 
 struct KernelFailure {

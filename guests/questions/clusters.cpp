@@ -38,7 +38,7 @@ std::vector<Verdict> judge_clusters(const Question& question, const Arrays& answ
   Clusters& clusters = state.clusters;
   const auto offsets = answers[0].of<int64_t>();
   const auto members = answers[1].of<int32_t>();
-  // A body without particles has no clusters, and nobody need say so.
+  // A body without particles has no clusters, with or without an answer.
   if (!offsets.empty()) clusters.offsets.assign(offsets.begin(), offsets.end());
   clusters.members.assign(members.begin(), members.end());
   const auto count = clusters.offsets.size() - 1;

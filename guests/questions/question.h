@@ -57,8 +57,7 @@ struct OperationDescription {
   Question (*draw)(uint64_t seed, int64_t index, Precision precision);
   int64_t (*cases_of)(const Question& question);
   std::string (*size_of)(const Question& question);  // "4 particles", for a person
-  // One verdict for each property that the operation has, whoever promised it; `answers` in the order above, in any
-  // precision.
+  // One verdict for each property of the operation, promised or not; `answers` in the order above, in any precision.
   std::vector<Verdict> (*judge)(const Question& question, const Arrays& answers, Precision precision);
   // What is wrong with a question that was read from a file, or "": sizes and indices. Types are right already.
   std::string (*problem)(const Question& question);

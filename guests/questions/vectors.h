@@ -1,5 +1,5 @@
-// Test vectors: questions to single kernels as a file of arrays, for those who link nothing, and what somebody's code
-// made of them, judged as plugins are (docs/reference/vectors.md).
+// Test vectors: questions to single kernels as a file of arrays, for programs that link nothing, and the answers of
+// such programs, judged like those of plugins (docs/reference/vectors.md).
 #pragma once
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
@@ -34,7 +34,7 @@ struct Vectors {
 // The first questions of this seed, as in a campaign: at least one of each kind, at most kMostCases.
 inline constexpr int64_t kMostCases = 100'000;
 Vectors draw_vectors(const OperationDescription& operation, uint64_t seed, int64_t cases, Precision precision);
-// What is drawn where nobody says how many.
+// Default number of drawn cases.
 int64_t usual_vector_cases(const OperationDescription& operation);
 
 // The whole file: questions, answers where they are unique, and what makes others acceptable.

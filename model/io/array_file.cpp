@@ -219,7 +219,7 @@ bool is_array_file(const std::string& path) {
   try {
     return !hdf5::has_attribute(hdf5::File::open(path).id(), "cutproof_file");
   } catch (const hdf5::Error&) {
-    return true;  // whoever reads it says what is wrong
+    return true;  // the reader reports the error
   }
 }
 

@@ -91,7 +91,7 @@ void* allocated(std::size_t bytes) {
 // without end. So what it may need is asked for before it is called. `more`: bytes beyond what any call needs.
 void require_memory(std::size_t more = 0) {
   if (reserve == nullptr) reserve.reset(allocated(kReserveBytes));
-  void* volatile block = allocated(kReserveBytes + more);  // volatile: or the compiler would see that nobody uses it
+  void* volatile block = allocated(kReserveBytes + more);  // volatile: keeps the compiler from removing unused memory
   std::free(block);
 }
 

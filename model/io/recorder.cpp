@@ -314,7 +314,7 @@ void Recorder::File::finish() {
   cluster_table.close();
   for (Shown* shown : {&particles, &skin, &blade}) shown->file.finish(shown->steps);
   index.close();
-  // The index comes last: whoever finds it finds all of them.
+  // The index comes last: if the index exists, all files exist.
   for (Shown* shown : {&particles, &skin, &blade}) shown->target.commit();
   index_target.commit();
 }

@@ -350,7 +350,7 @@ Snapshot RecordingReader::File::snapshot(std::size_t i) const {
 
 // --- What the files for ParaView say of the same run -----------------------------------------------------------------
 
-// Whoever has written them need not: then they show nothing.
+// A writer may leave them out: then they show nothing.
 constexpr const char* kShownRemedy =
     "Copy all files of the recording again, or record the scene again. A program that writes recordings can leave out "
     "the group VTKHDF/Steps.";

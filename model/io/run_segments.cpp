@@ -70,7 +70,7 @@ bool RunSegments::has_segments(const std::string& path) {
   try {
     return !hdf5_segments(path).empty();
   } catch (const InputError&) {
-    return false;  // whoever reads it says what is wrong
+    return false;  // the reader reports the error
   }
 }
 

@@ -64,9 +64,9 @@ class IterateProbe {
   std::vector<Shown> shown_;  // ascending
 };
 
-// What each probe wants to see. A backend that knows Setup::withheld_iterations runs all of it from the beginning of
-// the frame, in one load. Another backend runs each substep from the end of the one before; of its whole frame the
-// state is shown in double precision only.
+// The iterates that each probe needs. A backend that knows Setup::withheld_iterations runs all of them from the
+// beginning of the frame, in one batch. Another backend runs each substep from the end of the one before; of its whole
+// frame the state is shown in double precision only.
 std::vector<ShownStep> shown_iterates(Backend& backend, std::span<const IterateProbe> probes);
 
 }  // namespace cutproof::oracles

@@ -352,7 +352,7 @@ void SubstepJudge::particle(int32_t i, const Candidate& candidate, Vec3 seen, Ve
     ++undecided_;
   }
   // A backend adds up how far contacts have put particles from where its solver would have. Where that is no more than
-  // rounding, nobody knows whether it has counted this particle.
+  // rounding, it is not known whether the backend has counted this particle.
   const Vec3 push = seen - candidate.free;
   const bool is_clear = norm(push) > wide + after;
   pushed_ += (is_clear ? mass : mass / 2) * push;
@@ -438,7 +438,7 @@ double SubstepJudge::nearest_contact(int32_t i, const Candidate& candidate, Vec3
     after += 2 * spread;
     decided = after <= kAnywhere * spacing || best > after + kFarther * spread;
   }
-  // Where nobody knows which way it went, nobody knows from which side.
+  // Where its way is not known, its side is not known.
   if (explained != 0 && decided) sides_[at(i)] = explained;
   if (explained_directly == 0) return best;
   after = direct;

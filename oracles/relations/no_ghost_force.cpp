@@ -35,7 +35,7 @@ Verdict no_ghost_force(Backend& backend, const Setup& given, const State& state,
     const int32_t kicked = partition.label[at(particle)];
     const bool is_all = std::all_of(partition.label.begin(), partition.label.end(),
                                     [&](int32_t label) { return label < 0 || label == kicked; });
-    if (is_all) return;  // nobody is there who could feel it
+    if (is_all) return;  // no other piece could feel it
     const double dt = setup.substep_length[at(state.frame)];
     State disturbed_state = state;
     for (std::size_t i = 0; i < state.x.size(); ++i) {

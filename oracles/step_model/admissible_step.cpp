@@ -19,8 +19,8 @@
 namespace cutproof::oracles {
 namespace {
 
-// Without growth: within so much of the quadratic sum of single roundings nobody looks closer, because disturbed runs
-// would allow more (tolerances.md, The step again).
+// Without growth: within this multiple of the quadratic sum of single roundings, a particle is accepted, because
+// disturbed runs would allow more (tolerances.md, The step again).
 constexpr double kSurely = 2;
 // Of what clusters share, so much is left where they overlap when it is taken away once.
 constexpr double kNotShared = 0.125;
@@ -31,7 +31,7 @@ constexpr double kBeyondRuns = 8;
 // Of bodies whose runs cost more than this [evaluations] several go at the same time, where there are processors for
 // them: at most as many as are always made, since each takes some hundred bytes for each particle.
 constexpr int64_t kLongRun = 2'000'000;
-// Beyond this the way from a rounding to what it does is no longer straight [h].
+// Beyond this, the effect of a rounding is not linear [h].
 constexpr double kSmall = 1e-3;
 // Two rotations are not farther apart, but for the rounding of their entries (apart).
 constexpr double kAnyRotation = 2 + 1e-4;
@@ -123,7 +123,7 @@ class Judge {
 
   // Whether the rotation of a cluster (by its place) was stated.
   bool is_known(std::size_t c) const { return known_.empty() || known_[c] == RotationKnown::yes; }
-  // Whether where all violating particles are hangs on rotations that could be any of many, and that nobody has stated.
+  // Whether the places of all violating particles depend on rotations that are not unique and not given.
   bool hangs_on_unknown() const {
     std::set<int32_t> sets;
     for (int32_t c = 0; c < before_.clusters.count(); ++c) {

@@ -22,8 +22,8 @@ bool is_unique(const StepOutcome& outcome, int32_t c, double off, double u) {
   return best_rotation(a).separation > 3 * change + degenerate_rounds(u) * u;
 }
 
-// Whether each cluster says of its rotation whether another would be as good (method.md §3). Without iterations nobody
-// asks: what a cluster said, it says. Where rounding or a backend's threshold decides, nobody can tell.
+// Whether each cluster's flag tells whether its rotation is unique (method.md §3). Without iterations flags keep their
+// values. Where rounding or a backend's threshold decides, both values are accepted.
 void check_flags(const Setup& setup, const State& before, const State& after, const AdmissibleStep& step,
                  std::span<const RotationKnown> known_rotations, Verdict& verdict) {
   const StepOutcome& outcome = step.outcome;

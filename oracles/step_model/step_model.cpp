@@ -29,7 +29,7 @@ constexpr double kParameterRounds = 4;  // what is made of parameters once: s, e
 constexpr double kAlikeRounds = 256;
 // How much ways into the blade's frame and back round, in units of u times the distance from its edge.
 constexpr double kContactRounds = 4;
-// By so many roundings of that distance, nobody knows on which side of a border a place is.
+// Within this many roundings of that distance, the side of a border is not known.
 constexpr double kNearRounds = 32;
 
 // Up to so many times what the rounding of places makes of the matrix, it says nothing of how a cluster is turned.
