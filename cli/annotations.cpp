@@ -23,8 +23,8 @@ constexpr std::size_t kMostShown = 10;
 // GitHub takes 1 MiB of a step.
 constexpr std::size_t kMostInSummary = 50, kMostBytesOfOne = 2000;
 
-// What a line of a workflow cannot hold as it is; of a property of the line (its title) a colon and a comma, too, which
-// separate properties from each other and from the text.
+// Characters that a line of a workflow escapes. A property of the line (its title) also escapes colon and comma, which
+// separate properties and text.
 std::string escaped(std::string_view text, bool in_property) {
   std::string result;
   for_each_printable(text, true, [&](std::string_view piece, bool is_escape) {

@@ -1,4 +1,4 @@
-// --baseline F: what was judged beside what --json has written of the same before. What fails in both does not count.
+// --baseline F: compares a result with an earlier --json result. Failures of both do not count.
 #pragma once
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -18,8 +18,8 @@ struct Baseline {
   std::string file;
   nlohmann::json document;
 };
-// Nothing if `path` is empty. `formats`: of documents that may be compared; `scene`: of what will be judged, empty if
-// that has none. Throws InputError for a file that holds no such document, or one of another scene.
+// Nothing if `path` is empty. `formats`: of comparable documents; `scene`: the judged scene, or empty. Throws
+// InputError for a file without such a document, or with one of another scene.
 std::optional<Baseline> read_baseline(const std::string& path, const std::vector<std::string>& formats,
                                       const std::string& scene = "");
 
@@ -40,7 +40,7 @@ struct SinceBaseline {
   std::vector<std::string> not_judged;  // failed, and were not judged, or not as far
   std::vector<Slower> slower;           // by a quarter at least: told, and never a failure
 
-  // Whether all that fails is known; nothing excuses what failed for another reason than a verdict.
+  // Whether all failures are known. A failure without a verdict is never known.
   bool excuses() const { return fresh.empty() && !known.empty(); }
   bool is_known(const std::string& name) const;
   bool is_known(const Verdict& verdict, bool in_stages) const;
@@ -48,7 +48,7 @@ struct SinceBaseline {
 // Compares, and adds `baseline` to the document. Throws InputError for a baseline that cannot be understood.
 std::optional<SinceBaseline> since_baseline(const std::optional<Baseline>& baseline, nlohmann::json& document);
 
-// What is known is skipped, and says so.
+// Known failures become skipped cases with a message.
 void excuse_known(const SinceBaseline& since, std::vector<io::JunitCase>& cases);
 void add_baseline_to(ForGitHub& said, const SinceBaseline& since);
 // The last line says whether anything new fails.

@@ -5,8 +5,8 @@
 
 namespace cutproof::cli {
 
-// `segments`: of the run in `file`, which is read again for a page. Returns the exit status: 0 if what was judged
-// holds, 1 otherwise. Throws InputError if a segment cannot be understood.
+// `segments`: of the run in `file`, which is read again for a page. Returns the exit status: 0 if all verdicts hold, 1
+// otherwise. Throws InputError if a segment cannot be read.
 int check_run(io::RunSegments segments, const std::string& file, const StateReports& reports);
 
 }  // namespace cutproof::cli

@@ -22,14 +22,14 @@ struct StateReports {
 
 nlohmann::json not_judged_json(const std::vector<harness::NotJudged>& not_judged);
 
-// Of a file that was judged: writes JUnit, with properties of the whole, and prints the verdicts and what was not
-// judged. `since`: beside a baseline, or null.
+// For a judged file: writes JUnit, with properties of the whole, and prints the verdicts and the properties that were
+// not judged. `since`: beside a baseline, or null.
 void show_judged(const std::vector<Verdict>& verdicts, const std::vector<harness::NotJudged>& not_judged,
                  const std::vector<std::string>& notes, const Shown& shown, const Judging& judging,
                  const StateReports& reports, const std::vector<std::pair<std::string, std::string>>& properties = {},
                  const SinceBaseline* since = nullptr);
 
-// Judges, prints, and writes what is asked for. `contents`: of the file. Returns the exit status.
+// Judges, prints, and writes the requested files. `contents`: of the file. Returns the exit status.
 int check_state(const io::ArrayFile& contents, const std::string& file, const StateReports& reports);
 
 }  // namespace cutproof::cli

@@ -9,7 +9,7 @@ class App;
 
 namespace cutproof::cli {
 
-// What the command line asks for. Returns an exit status: 0 everything holds, 1 a verdict failed or nothing was judged.
+// The work of the command line. Returns an exit status: 0 everything holds, 1 a verdict failed or nothing was judged.
 // Bad input is an InputError (status 2), a failing machine a MachineError (status 3), a plugin that cannot run here a
 // guests::CannotRunHere (status 77, which CTest and others take for skipped); main() turns them into these.
 using Work = std::function<int()>;

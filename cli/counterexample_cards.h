@@ -10,10 +10,9 @@
 
 namespace cutproof::cli {
 
-// Adds to `card` what the case is and what comes of it now, and the command that shows it; to `sceneries` its states,
-// as long as there is room. `chosen`: the backend to run it on; without, the one on which it was found, unless that is
-// a plugin: a document may name any library, and none is run because a document says so. Returns whether it fails;
-// nothing if it was not run.
+// Adds to `card` the case, its present result and the command that shows it, and to `sceneries` its states, as long as
+// there is room. `chosen`: the backend to run it on; by default the one that failed, unless that is a plugin: a
+// document must not start an arbitrary library. Returns whether the case fails; nothing if it was not run.
 std::optional<bool> add_counterexample(report::Card& card, const property_tests::Counterexample& counterexample,
                                        const std::string& file, const std::optional<harness::BackendChoice>& chosen,
                                        std::vector<report::Scenery>& sceneries);

@@ -35,7 +35,7 @@ std::string place_of(const std::string& named, const std::string& document) {
 report::Sheet campaign(const json& document, const std::string& file, const std::optional<BackendChoice>& chosen,
                        std::vector<report::Scenery>& sceneries) {
   const std::string name = file.empty() ? "this campaign" : file;
-  // Field by field first: what follows reads it without asking.
+  // Checks all fields first: the code below reads them unchecked.
   static_cast<void>(report::sheet_of(document, name));
   property_tests::require_campaign(document, name);
   const std::string failure = property_tests::conclude(document, document.at("shards") == 1).failure;
@@ -73,7 +73,7 @@ void add_sheets(const json& document, const std::string& file, const std::option
 }  // namespace
 
 std::string campaign_again(const json& document) {
-  // What a document does not hold as a campaign has it is left out.
+  // Fields that a campaign's document lacks are left out.
   const auto text = [&](const char* name) { return document.value(name, std::string()); };
   std::string command = "cutproof fuzz --backend " + quoted(text("backend"));
   if (!text("schedule").empty()) command += " --schedule " + quoted(text("schedule"));

@@ -153,7 +153,7 @@ json to_json(const Errors& errors, const harness::Lockstep* lockstep) {
 void print_errors(const Errors& errors, const json& document) {
   constexpr std::size_t kName = 16;
   say("\nerrors\n");
-  // What was not measured is not there, or null.
+  // Errors that were not measured are absent or null.
   const auto row = [&](const char* kind, const char* name, const std::string& text) {
     if (!document.contains(kind) || document.at(kind).is_null()) return std::string();
     return io::hanging(fmt::format("{:<{}}{}", name, kName, io::filled(text, document.at(kind))), kName) + "\n";

@@ -10,14 +10,14 @@
 
 namespace cutproof::cli {
 
-// What errors_wanted() understands.
+// The names that errors_wanted() accepts.
 std::vector<std::string> error_names();
 // Names with commas between them, or `all`. Throws InputError.
 harness::ErrorsWanted errors_wanted(const std::string& list);
 
 // `lockstep` is null without the implementation error.
 nlohmann::json to_json(const harness::Errors& errors, const harness::Lockstep* lockstep);
-// `document`: what to_json made of them.
+// `document`: from to_json.
 void print_errors(const harness::Errors& errors, const nlohmann::json& document);
 
 }  // namespace cutproof::cli

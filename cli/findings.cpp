@@ -35,7 +35,7 @@ std::string in_full(const Verdict& verdict, const Judging& judging) {
   return text + ": " + io::measured_text(verdict);
 }
 
-// Its witness says what was found; a property of few words has none.
+// The witness describes the failure; a property of few words has none.
 std::string what_was_found(const Verdict& verdict, const Judging& judging) {
   return verdict.witness.text.empty() ? in_full(verdict, judging) : verdict.witness.text;
 }
@@ -97,7 +97,7 @@ std::string replay_command(const json& violation, const Judging& judging) {
   return file.empty() ? judging.again : "cutproof replay " + quoted(file);
 }
 
-// What a campaign that does not hold lacks beside properties that hold.
+// Why a campaign does not hold although its properties hold.
 bool is_about_the_whole(const json& document, const std::string& failure) {
   return !failure.empty() && (document.at("violations").empty() || !document.at("complete"));
 }
@@ -217,7 +217,7 @@ std::vector<JunitCase> cases_of_campaign(const json& document, const std::string
   for (JunitCase& one : cases_of_left(document.at("left_to_reference"), judging)) cases.push_back(std::move(one));
   JunitCase& whole = case_named(kEnoughJudged);
   if (is_about_the_whole(document, failure)) {
-    // Cases that are missing could not be judged; what was judged too little was judged, and that is the failure.
+    // Missing cases could not be judged: an error. Too few judgements are a failure.
     whole.outcome = document.at("complete") ? JunitOutcome::failed : JunitOutcome::error;
     whole.message = failure;
     whole.text = fmt::format("{}\nsee it again: {}\n", failure, judging.again);

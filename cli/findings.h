@@ -1,4 +1,4 @@
-// What verdicts and campaigns came to, for continuous integration: as test cases (JUnit) and as annotations.
+// Results of verdicts and campaigns for continuous integration: test cases (JUnit) and annotations.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -19,7 +19,7 @@ std::string case_name(const std::string& property, std::string_view stage);
 // "cutproof.VERB.SUBJECT". Readers part such a name at its dots, so those of a path are written as '_'.
 std::string class_of(const std::string& verb, std::string subject = "");
 
-// Who judged what, and how to see it again.
+// The judging subcommand, the class of test cases, and the command that repeats the judgement.
 struct Judging {
   std::string suite;       // such as "cutproof run"
   std::string class_name;  // of its cases: class_of()
@@ -29,7 +29,7 @@ struct Judging {
   bool in_stages() const { return of == Of::stages; }
 };
 
-// The case and the annotation of what is no property: that enough was judged, and all of it.
+// The case and the annotation of a requirement that is no property: enough was judged, completely.
 inline constexpr const char* kEnoughJudged = "enough was judged";
 
 // A case for each property and stage, or each property where there are no stages, in the order in which they first
@@ -37,8 +37,8 @@ inline constexpr const char* kEnoughJudged = "enough was judged";
 // looked at anything. `is_expected`: a failure that the scene asks for, which passes.
 std::vector<io::JunitCase> cases_of(const std::vector<Verdict>& verdicts, const Judging& judging,
                                     const std::function<bool(const Verdict&)>& is_expected = {});
-// The same of all that was judged of a run. Skipped are what was not promised, with how often it would not hold, and
-// each stage that was left to the reference.
+// The same for all verdicts of a run. Unpromised properties are skipped, with the number of states in which they would
+// fail, and so is each stage that the reference ran.
 std::vector<io::JunitCase> cases_of(const harness::SceneJudge& judge, const Judging& judging);
 // A skipped case for each stage that the reference ran for the backend.
 std::vector<io::JunitCase> cases_of_left(const std::vector<std::string>& stages, const Judging& judging);
@@ -47,7 +47,7 @@ std::vector<io::JunitCase> cases_of_left(const std::vector<std::string>& stages,
 std::vector<io::JunitCase> cases_of_campaign(const nlohmann::json& document, const std::string& failure,
                                              const Judging& judging);
 
-// One for each property, with what its first failing verdict has found, and how many more there are.
+// One for each property, with its first failing verdict and the number of further ones.
 std::vector<Failure> failures_of(const std::vector<Verdict>& verdicts, const Judging& judging,
                                  const std::function<bool(const Verdict&)>& is_expected = {});
 std::vector<Failure> failures_of_campaign(const nlohmann::json& document, const std::string& failure,

@@ -19,7 +19,7 @@ std::size_t begin_of_explanation(const std::string& line) {
   return gap == std::string::npos ? name : std::min(line.find_first_not_of(' ', gap), line.size());
 }
 
-// A terminal of 24 lines shows all of it. Tests and shells read what stands behind "Subcommands:".
+// Fits a terminal of 24 lines. Tests and shells read the text after "Subcommands:".
 std::string overview(const CLI::App& program) {
   std::string subcommands;
   bool has_pages = false;

@@ -5,7 +5,7 @@
 
 namespace cutproof::cli {
 
-// What the parsed command line asks help for, in lines that fit the screen: what an option does stands below itself.
+// The requested help page, in lines that fit the screen; explanations of options are aligned.
 std::string help_page(const CLI::App& program);
 
 }  // namespace cutproof::cli

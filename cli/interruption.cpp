@@ -64,7 +64,7 @@ void handle_signals() {
     if (sigaction(signal, nullptr, &inherited) == 0 && inherited.sa_handler == SIG_IGN) continue;
     sigaction(signal, &action, nullptr);
   }
-  // Also where it was ignored: who closes a pipe wants nothing more of it, and no error.
+  // Also where it was ignored: a closed pipe means the end of output, without an error.
   sigaction(SIGPIPE, &action, nullptr);
   ::signal(SIGXFSZ, SIG_IGN);
 }

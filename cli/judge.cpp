@@ -40,7 +40,7 @@ struct JudgeOptions {
   GuestOptions guest;
   std::vector<std::string> operations;  // empty: all that the plugin has
   KernelCampaignOptions campaign;
-  int64_t cases = 0;                          // 0: of each operation what it takes a second or a few for
+  int64_t cases = 0;                          // 0: for each operation a number that takes a few seconds
   std::optional<std::vector<int64_t>> sizes;  // of large questions; 0: none; nothing: those of each operation
   bool keep_going = false;                    // beyond ten questions that were not answered
   std::string save = ".";
@@ -49,14 +49,14 @@ struct JudgeOptions {
   std::vector<int> attached;  // open files of a guest that runs already: its channel, its memory
 };
 
-// Not one of operations(): random dissections, of which the plugin runs what it can.
+// Not one of operations(): random dissections, with the stages that the plugin can run.
 constexpr const char* kOnStages = "stages";
 
 bool has_stages(const PluginInfo& plugin) { return plugin.offers(wire::load) && plugin.offers(wire::run); }
 
 constexpr int64_t kUsualDissections = 500;
 
-// Operations by what one case costs.
+// Operations by the cost of one case.
 int64_t usual_cases(const OperationDescription& operation) {
   return operation.number == wire::rotations ? 100'000 : operation.is_simulator() ? 200 : 2'000;
 }
@@ -137,7 +137,7 @@ void print_kinds(const KernelCampaign& campaign) {
   if (right > 0) say("  nothing is wrong in {}\n", counted(right, "other kind", "other kinds"));
 }
 
-// Of a simulator: what was tested.
+// Of a simulator: the tested promises.
 void print_scenes(const KernelCampaign& campaign) {
   Table table({"kind", "scenes", "refused", "cut as drawn"});
   for (const KindSummary& kind : campaign.kinds) {
@@ -176,7 +176,7 @@ std::string replay_command(const JudgeOptions& options, const std::string& file,
                      quoted(file));
 }
 
-// What a simulator makes of it, for `cutproof check`.
+// A simulator's answer, for `cutproof check`.
 void keep_run(const std::string& file, Guest& guest, const OperationDescription& operation,
               const KernelFailure& failure) {
   if (guest.has_ended()) return;
@@ -194,7 +194,7 @@ void keep_run(const std::string& file, Guest& guest, const OperationDescription&
   insist_copy("  its run:", "cutproof check " + quoted(folder.string()));
 }
 
-// Saves what was found and says how to see it again.
+// Saves the failure and prints the command that repeats it.
 std::string keep(const JudgeOptions& options, Guest& guest, const KernelCampaign& campaign,
                  const KernelFailure& failure) {
   SavedQuestion saved;

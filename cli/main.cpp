@@ -49,8 +49,8 @@ int status_of_exception() noexcept {
   }
 }
 
-// Destructors of libraries that need memory cannot say that there is none, so they end here: nlohmann::json takes its
-// values apart on a stack that it allocates.
+// Destructors that run out of memory end here, because they cannot throw: nlohmann::json allocates a stack to destroy
+// its values.
 [[noreturn]] void end_with_status() {
   const int status = std::current_exception() != nullptr ? status_of_exception() : say("a defect of this program", 3);
   std::fflush(stdout);

@@ -1,4 +1,4 @@
-// What was done to a mesh, and what a body was built with otherwise than the scene says: printed, and for --json.
+// Repairs of a mesh, and differences of a body from its scene: printed, and for --json.
 #pragma once
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -15,7 +15,7 @@ CLI::Option* add_unit(CLI::App& command, std::string& unit);
 // Metres per such a unit.
 double metres_per(const std::string& unit);
 
-// Says on the terminal what repair does, which may take a while.
+// Shows the progress of repair on the terminal.
 fixtures::OnRepairStep repair_progress();
 
 // Nothing if nothing was repaired and there is nothing to note.

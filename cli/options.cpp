@@ -81,7 +81,7 @@ void add_junit(CLI::App& command, std::string& path) {
 std::string quoted(const std::string& word) {
   constexpr const char* kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_./:=,+@%-";
   if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
-  if (printable(word) != word) {  // as bash and zsh take it, and a terminal bears it
+  if (printable(word) != word) {  // as bash and zsh read it, and safe on a terminal
     std::string result = "$'";
     for_each_printable(word, false, [&](std::string_view piece, bool is_escape) {
       for (const char c : piece) {

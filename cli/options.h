@@ -15,15 +15,15 @@ namespace cutproof::cli {
 // like output of this program.
 void refuse_odd_words(const CLI::App& command);
 
-// --backend alone. `what`: what it does, for the help, which lists those of which `offered` holds.
+// --backend alone. `what`: its explanation for help, which lists the backends that `offered` accepts.
 void add_backend_name(CLI::App& command, std::string& name, const std::string& what,
                       const std::function<bool(const harness::BackendDescriptor&)>& offered = {});
-// --backend, and what may be said about schedules.
+// --backend, and the options of schedules.
 void add_backend(CLI::App& command, harness::BackendChoice& choice, const std::string& what,
                  const std::function<bool(const harness::BackendDescriptor&)>& offered = {});
-// --devices, for those who run campaigns.
+// --devices, for campaigns.
 void add_devices(CLI::App& command, std::string& devices);
-// For what is timed.
+// For timed runs.
 bool is_timed(const harness::BackendDescriptor& backend);
 
 // --name N. A default of 0 says that there is none, and is not told.
@@ -59,8 +59,8 @@ void add_junit(CLI::App& command, std::string& path);
 
 // A word as a shell takes it.
 std::string quoted(const std::string& word);
-// The command line that names `command` as it was given, without what it writes (--json, --junit, --record, --report):
-// to be given again. Requires that it has been parsed.
+// The command line of `command` as given, without its output files (--json, --junit, --record, --report), to repeat the
+// command. Requires that it has been parsed.
 std::string as_given(const CLI::App& command);
 
 void add_json(CLI::App& command, std::string& path, const std::string& what);

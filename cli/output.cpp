@@ -20,7 +20,7 @@ namespace cutproof::cli {
 
 namespace {
 
-int document_file = -1;  // what standard output was, for the document that goes there
+int document_file = -1;  // the original standard output, for the document that goes there
 
 }  // namespace
 

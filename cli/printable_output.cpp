@@ -13,10 +13,10 @@
 namespace cutproof::cli {
 namespace {
 
-constexpr std::size_t kMostPending = 16;  // bytes of what may be the beginning of a character or of a colour
+constexpr std::size_t kMostPending = 16;  // bytes that may begin a character or a colour
 
-// What is written in one call may end within a character: the rest waits here. Lives as long as the process, since the
-// C library writes at its very end.
+// A call may end within a character: its first bytes wait here. Lives as long as the process, because the C library
+// writes until the end.
 struct Pending {
   std::array<char, kMostPending> bytes;
   std::size_t count = 0;
@@ -97,7 +97,7 @@ std::size_t begun_character(std::string_view text) {
   return 0;
 }
 
-// Returns what is left over for the next call.
+// Returns the bytes left over for the next call.
 std::string_view write_printable(std::string_view text, Writer& out) {
   const auto add = [&](std::string_view piece, bool) { out.add(piece); };
   while (colours) {
@@ -119,7 +119,7 @@ std::string_view write_printable(std::string_view text, Writer& out) {
 ssize_t write_output(void*, const char* bytes, std::size_t count) {
   Writer out;
   std::string_view text(bytes, count);
-  // Together with what waits, byte by byte until that is settled.
+  // Together with the waiting bytes, byte by byte until these are complete.
   while (pending.count > 0 && !text.empty()) {
     pending.bytes[pending.count++] = text[0];
     text.remove_prefix(1);

@@ -114,7 +114,7 @@ void Progress::show(int64_t done, const std::string& what, double part) {
   last_ = time;
   const std::string count =
       total_ > 0 ? fmt::format("{} {} of {}", thing_, done, total_) : fmt::format("{} {}", thing_, done);
-  // What a narrow terminal cuts off first stands last.
+  // The least important part is last, where a narrow terminal cuts first.
   draw(fmt::format("{}, {}: {}", count, elapsed_and_remaining(time - begin_, remaining_.seconds()), what));
 }
 

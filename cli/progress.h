@@ -17,8 +17,8 @@ class Remaining {
  public:
   // `part` in [0, 1] was done `seconds` after the beginning; neither falls from one call to the next.
   void note(double seconds, double part);
-  // [s]; nothing as long as too little is known. By the pace of the latter half of the time, because what comes first
-  // is often another kind of work: tissue that is not cut yet, or cases that are smaller.
+  // [s]; empty as long as too little is known. By the rate of the latter half of the time, because early work often
+  // differs: uncut tissue, or smaller cases.
   std::optional<double> seconds() const;
 
   // How many notes are kept, however many there were.
@@ -34,7 +34,7 @@ class Remaining {
 
 // "40 s", "2 min", "1 h 20 min": two figures at most.
 std::string in_words(double seconds);
-// "elapsed 12 s, about 2 min left"; without what is not known.
+// "elapsed 12 s, about 2 min left"; without unknown parts.
 std::string elapsed_and_remaining(double elapsed, std::optional<double> remaining);
 
 class Progress {
@@ -49,7 +49,7 @@ class Progress {
   // `part`: how much of the whole is done, where that is not done / total.
   void show(int64_t done, const std::string& what, double part);
 
-  // What is done now, where there is nothing to count; shown at once.
+  // The present work, where there is nothing to count; shown at once.
   void tell(std::string_view what);
 
   // Takes the line off the terminal, so that something else can be printed: of whichever there is.

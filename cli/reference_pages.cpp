@@ -15,7 +15,7 @@ namespace cutproof::cli {
 
 namespace {
 
-// What a value is, by the name that help gives it.
+// The kind of a value, by its type name in help.
 enum class Value { word, file, folder };
 Value kind_of(const std::string& type) {
   if (type == "DIR") return Value::folder;
@@ -45,7 +45,7 @@ void for_each_command(const CLI::App& command, const std::string& name,
 
 // --- Shells ----------------------------------------------------------------------------------------------------------
 
-// What bash and zsh take alike: assignments to `offered` and `kind`.
+// Common code of bash and zsh: assignments to `offered` and `kind`.
 std::string offer_of(const CLI::Option& option) {
   const std::vector<std::string> words = words_of(option);
   const Value kind = kind_of(option.get_type_name());
@@ -66,7 +66,7 @@ std::string offer_of(const CLI::Option& option) {
 // Alternatives of `case`, as bash and zsh have it.
 struct Alternatives {
   std::string commands;   // "run/…": what a word makes of the command
-  std::string flags;      // of each command its options, and what is below it
+  std::string flags;      // of each command its options and subcommands
   std::string values;     // of each option that takes one
   std::string arguments;  // of each command that takes some
 };
@@ -95,7 +95,7 @@ Alternatives alternatives_of(const CLI::App& program) {
   return all;
 }
 
-// What is offered, once it is known where the word stands.
+// The offered words, given the position of the word.
 std::string choice_among(const Alternatives& all) {
   return fmt::format(R"(  case "$at" in
 {}  esac

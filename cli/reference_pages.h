@@ -1,4 +1,4 @@
-// What a shell offers and what `man` shows, from the options as the program declares them.
+// Completion scripts and the manual page, from the declared options.
 #pragma once
 #include <CLI/CLI.hpp>
 #include <string>

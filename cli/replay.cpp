@@ -1,4 +1,4 @@
-// `cutproof replay`: a counterexample once more.
+// `cutproof replay`: runs a counterexample again.
 #include <fmt/format.h>
 
 #include <memory>

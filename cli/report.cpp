@@ -1,4 +1,4 @@
-// `cutproof report`: a page for a browser, from a recording and what was judged of it.
+// `cutproof report`: a page for a browser, from a recording and its verdicts.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -48,7 +48,7 @@ constexpr const char* kSets =
     "fuzz, alone or with counterexamples "
     "of it; or a result of judge; or results of bench; or results of tune; or counterexamples";
 
-// What the command line names, by what the files hold.
+// The files of the command line, by their contents.
 struct Given {
   std::vector<std::string> recordings;
   std::map<report::DocumentKind, std::vector<std::size_t>> documents;  // by number
@@ -56,7 +56,7 @@ struct Given {
   std::vector<nlohmann::json> contents;
 };
 
-// The files of a recording are HDF5, whose first bytes say so; it may be named without its ending.
+// The files of a recording are HDF5, known by their first bytes; a recording may be named without its ending.
 bool is_recording(const std::string& file) {
   namespace fs = std::filesystem;
   std::error_code error;

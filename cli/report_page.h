@@ -10,11 +10,11 @@
 namespace cutproof::cli {
 
 void add_report_option(CLI::App& command, std::string& path);
-// A failure now rather than after the run: throws InputError if this build makes no pages, or the folder is not there
-// or not writable. Nothing if `path` is empty.
+// Fails before the run, not after it: throws InputError if this build makes no pages, or if the folder does not exist
+// or is not writable. Nothing if `path` is empty.
 void require_report(const std::string& path, const std::string& option = "--report");
 
-// Here and now. `backend`: on whose processor the work was done; empty: the reference's.
+// With the present time and machine. `backend`: the backend whose processor did the work; empty: the reference.
 report::Made made_by(const std::string& command, const std::string& backend = {});
 
 // A recording that lies beside the one that a page is about, with the words for it.
@@ -24,7 +24,7 @@ struct ReadBeside {
   std::string name, own_name, obtained;  // as in report::Beside
 };
 
-// `document`: what --json writes of `run` or `check`. `made`: by the command that shows it again. `beside` may be null.
+// `document`: the --json document of `run` or `check`. `made`: with the command that repeats it. `beside` may be null.
 void write_report(const std::string& path, const io::RecordingReader& recording, const nlohmann::json& document,
                   const report::Made& made, const ReadBeside* beside = nullptr);
 // The same of results that are read already. `again`: the command that judges it again.

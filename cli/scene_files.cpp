@@ -16,8 +16,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Beside the program that runs: what an installation has, else what the source tree has in which it was built. Not
-// compiled in, because packages are unpacked anywhere. Empty if neither is there.
+// The folder of scenes beside the running program: of an installation, else of the source tree of the build. Not
+// compiled in, because packages are unpacked anywhere. Empty if neither exists.
 fs::path scene_folder() {
   std::error_code error;
   const fs::path program = fs::read_symlink("/proc/self/exe", error);

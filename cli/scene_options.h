@@ -23,18 +23,18 @@ struct SceneOptions {
 CLI::Option* add_scene(CLI::App& command, SceneOptions& options);
 
 // In the order in which they are made: every --set as given, then --particles, --spacing and --seed, which are short
-// for fields. Throws InputError for what is none, or for two of them that contradict each other.
+// for fields. Throws InputError for a malformed change, or for two that contradict each other.
 std::vector<io::SceneChange> changes_of(const SceneOptions& options);
 
-// Of what a scene expects takes away how many particles and clusters there are, where the command line asks for another
-// number of particles: that is then no outcome. A --set of such an expectation stays. Gives what was taken, in words.
+// Removes the expected numbers of particles and clusters if the command line changes the number of particles. A --set
+// of such an expectation stays. Returns the names of removed expectations.
 std::vector<std::string> take_replaced_counts(const SceneOptions& options, Expectations& expected);
 
 // As documents have them.
 std::vector<std::string> given_changes(const std::vector<io::SceneChange>& changes);
 
-// What `build` makes of a scene that was read with these changes. An error about a field that a change has made names
-// the change in place of `file`.
+// The result of `build` for a scene that was read with these changes. An error about a changed field names the change
+// in place of `file`.
 template <class Build>
 auto with_sources(const std::string& file, const std::vector<io::SceneChange>& changes, const Build& build) {
   try {

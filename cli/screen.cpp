@@ -25,7 +25,7 @@ Style& present_style() {
   return present;
 }
 
-// What was said of a line that has not ended.
+// The text of an unfinished line.
 std::string& open_line() {
   static std::string open;
   return open;

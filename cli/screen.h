@@ -18,13 +18,13 @@ enum class ColourChoice { automatic, always, never };
 
 struct Style {
   bool colour = false;
-  bool quiet = false;    // only what fails, and the last line
+  bool quiet = false;    // only failures, and the last line
   bool verbose = false;  // every row of the verdicts
 };
 void set_style(const Style& style);
 const Style& style();
 
-// What is asked for on the command line.
+// The style that the command line asks for.
 struct AskedStyle {
   std::string color = "auto";
   bool quiet = false, verbose = false;
@@ -36,11 +36,11 @@ void add_style(CLI::App& program, AskedStyle& asked);
 // before both.
 Style settled(const AskedStyle& asked, bool is_terminal);
 
-// Lines that begin and end anywhere: a line is printed once its end is there, broken at words (columns.h).
-// say: not under --quiet. insist: what fails, and the last line, always.
+// Lines that begin and end anywhere: a line is printed once its end is there, broken at words (columns.h). say: not
+// under --quiet. insist: always, for failures and the last line.
 void say_text(const std::string& text);
 void insist_text(const std::string& text);
-// What is set out in columns already, or longer than them because it is data, as it is.
+// Prints text unchanged that has its own columns, or data that may be wider.
 void say_as_it_is(const std::string& text);
 void insist_as_it_is(const std::string& text);
 template <class... T>
@@ -54,7 +54,7 @@ void insist(fmt::format_string<T...> format, T&&... values) {
 // A command or a path to be copied, after these words if there is room, else on a line of its own.
 void insist_copy(const std::string& words, const std::string& copied);
 void say_copy(const std::string& words, const std::string& copied);
-// What waits for the end of its line.
+// Text that waits for the end of its line.
 void end_line();
 // Whole lines on standard error. On a terminal they are broken as those of standard output are, to its columns,
 // kColumns at most, or to as many as COLUMNS says; elsewhere, where a tool reads them, an error keeps its line. Pieces,
@@ -64,7 +64,7 @@ void print_error(std::initializer_list<std::string_view> pieces) noexcept;
 // Colours, never the only carrier of a meaning.
 std::string failing(const std::string& text);    // red
 std::string holding(const std::string& text);    // green
-std::string undecided(const std::string& text);  // yellow: what is not promised, or not decided
-std::string lesser(const std::string& text);     // dim: what matters less
+std::string undecided(const std::string& text);  // yellow: not promised, or inconclusive
+std::string lesser(const std::string& text);     // dim: less important
 
 }  // namespace cutproof::cli

@@ -85,8 +85,8 @@ std::string level_text(const json& level) {
   return io::filled("scene's {substeps} substeps, each solved without the reference's step", level) + others;
 }
 
-// Why a distance may not have fallen: what the level and the one before remove at different times, do not both remove,
-// or have merged otherwise.
+// Why a distance may not have fallen: the two levels removed particles at different times, removed different particles,
+// or merged differently.
 std::string events_text(const json& level) {
   std::string text;
   const auto add = [&](const char* key, const char* what, const char* how) {
@@ -141,7 +141,7 @@ std::string ms_and_range(const json& times) {
   return io::filled("{1e3*median:.3f} ({1e3*min:.3f} to {1e3*max:.3f})", times);
 }
 
-// The cheapest for each tolerance, and what it costs beside the scene as given.
+// The cheapest configuration for each tolerance, and its cost beside the scene as given.
 void print_front(const json& document) {
   const json& trials = document.at("trials");
   json rows = json::array();
@@ -269,14 +269,14 @@ int tune(Asked asked) {
     document["build"] = build_json(built);
     document["changes"] = given_changes(asked.tune.changes);
     document["again"] = asked.again;
-    // After each trial, so that what has been measured is kept if a later one fails; and in the end.
+    // After each trial, so that measurements are kept if a later one fails; and at the end.
     if (step == TuneStep::trial || step == TuneStep::searched) keep_document(asked.json, document);
     if (step == TuneStep::stopped || document.at("complete")) {
       write_document(asked.json, document);
       write_document_report(asked.report, document, made_by(asked.again, document.at("backend")));
     }
     print(asked.tune, step, document, given, built);
-    if (step == TuneStep::trial) part = std::max(part, part_searched(document, given));  // what is varied begins anew
+    if (step == TuneStep::trial) part = std::max(part, part_searched(document, given));  // restarts by parameter
     flush_output();
     if (step == TuneStep::stopped || document.at("complete")) return;
     const char* const what = step == TuneStep::begun      ? "computing the reference solution"

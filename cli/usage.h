@@ -1,4 +1,4 @@
-// What is wrong with a command line that cannot be understood.
+// The error of a malformed command line.
 #pragma once
 #include <CLI/CLI.hpp>
 #include <string>

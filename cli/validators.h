@@ -1,5 +1,5 @@
-// What values of options may be, said in words. CLI11's own validators say ranges in hundreds of digits, and its
-// conversions take 2^64 for 2^64 - 1, 010 for 8 and nan for a number of seconds.
+// Validators of option values, with messages in words. CLI11's own validators print ranges in hundreds of digits, and
+// its conversions read 2^64 as 2^64 - 1, 010 as 8 and nan as a number of seconds.
 #pragma once
 #include <CLI/CLI.hpp>
 #include <cstdint>

@@ -28,7 +28,7 @@ void add_bench(CLI::App& program, Work& work) {
   for (const CLI::App* const command : bench->get_subcommands([](const CLI::App*) { return true; })) {
     names.push_back(command->get_name());
   }
-  // What is no suite's name ends up here, where it is refused.
+  // Takes a name that is no suite's, to refuse it.
   const auto unknown = std::make_shared<std::vector<std::string>>();
   bench->add_option("suite", *unknown)->group("");
   bench->callback([suite, unknown, names, &work] {
@@ -46,7 +46,7 @@ void add_bench(CLI::App& program, Work& work) {
 
 namespace {
 
-// Of a suite that was stopped. What it has measured has been written after each row.
+// Of a stopped suite, whose measurements were written after each row.
 int print_how_far(const std::string& path, const std::string& report, const nlohmann::json& document,
                   const Suite& suite) {
   const std::size_t rows = document.at(suite.rows).size();

@@ -6,7 +6,7 @@ namespace cutproof::cli {
 
 namespace {
 
-// Of a size: relative to what is there is what has no unit.
+// A size without a unit is relative.
 std::string words_of(const nlohmann::json& unit) { return unit == "1" ? "relative" : unit.get<std::string>(); }
 
 void print_row_of_sensitivity(const nlohmann::json& document) {

@@ -1,5 +1,5 @@
-// The suites of `cutproof bench`. Each has a file here: it declares the options, calls the suite, and says what a
-// person sees of the document.
+// The suites of `cutproof bench`. Each has a file here that declares the options, calls the suite, and prints the
+// document for people.
 #pragma once
 #include <fmt/format.h>
 
@@ -32,7 +32,7 @@ void add_sensitivity(CLI::App& bench, Work& work);
 void add_parts(CLI::App& bench, Work& work);
 void add_campaigns(CLI::App& bench, Work& work);
 
-// What a suite does, and what it shows of its document: once before the first row, after each row, and in the end.
+// The run of a suite, and the output of its document: before the first row, after each row, and at the end.
 struct Suite {
   using Show = std::function<void(const nlohmann::json& document)>;
   static void nothing(const nlohmann::json&) {}
@@ -42,7 +42,7 @@ struct Suite {
   std::string rows = "rows";  // the list of the document that must not be empty
 };
 // Adds --json, which writes `what`, and sets `work` if the command line names this suite. The document is written after
-// each row, so that what has been measured is kept if a later row fails.
+// each row, so that measurements are kept if a later row fails.
 void add_suite(CLI::App& command, Work& work, const std::string& what, Suite suite);
 
 // The options that suites which time whole scenes have in common.
