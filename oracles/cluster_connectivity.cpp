@@ -5,7 +5,7 @@
 
 namespace cutproof::oracles {
 
-// Dead members are coverage's business: here a cluster is what is alive of it.
+// The property coverage judges dead members; here only living members count.
 void check_cluster_connectivity(Judged& judged, Verdict& verdict) {
   std::vector<int32_t> member_of(at(judged.body.particle_count()), -1);   // the last cluster seen to hold it
   std::vector<int32_t> reached_in(at(judged.body.particle_count()), -1);  // the last cluster it was reached in

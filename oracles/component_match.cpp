@@ -29,8 +29,8 @@ void tell_of_ghost_coupling(Judged& judged, Verdict& verdict) {
 
 }  // namespace
 
-// Where both halves are violated the witness is that of a coupling too far: only then does it name a cluster, by which
-// those who expect isolated clusters tell that there is more (harness/expectations.cpp).
+// Where both halves are violated the witness shows a coupling between components. Only such a witness names a cluster,
+// so that an expectation of isolated clusters does not hide it (harness/expectations.cpp).
 void check_component_match(Judged& judged, Verdict& verdict) {
   const Partition& components = judged.components();
   const Partition& coupling = judged.coupling();

@@ -74,8 +74,7 @@ Local Contact::on_border(Local c, double near) const {
   return c;
 }
 
-// Forbidden is what is nearer than ρ to the rectangle, and what lies over it on the side where the particle did not
-// begin.
+// Forbidden are places nearer than ρ to the rectangle, and places over it on the side where the particle did not begin.
 Vec3 Contact::way_off_plate(Vec3 x, int side, Found& found, const Rounding& rounding) const {
   Local c = seen_from_blade(x);
   if (rounding.on_borders) c = on_border(c, rounding.near);
@@ -133,7 +132,7 @@ Vec3 Contact::projected(Vec3 x, int side, Found& found, const Rounding& rounding
   return now;
 }
 
-// Takes back at most `most` of what `slid` has along a surface with this normal.
+// Reduces the tangential part of `slid` along a surface with this normal by at most `most`.
 Vec3 Contact::rubbed(Vec3 x, Vec3 slid, Vec3 normal, double most, Found& found) {
   const Vec3 tangential = slid - dot(slid, normal) * normal;
   const double length = norm(tangential);

@@ -1,4 +1,4 @@
-// Detection (method.md §4): removed is what the criterion demands, up to rounding.
+// Detection (method.md §4): the removals are those that the criterion demands, up to rounding.
 #include <fmt/format.h>
 
 #include <algorithm>

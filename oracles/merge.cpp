@@ -11,11 +11,11 @@
 namespace cutproof::oracles {
 namespace {
 
-// Finds out from the sets alone which clusters of the input became which cluster of the result. A number of the
-// result is the number of one of its inputs, and a cluster is used once, so an input whose number survives belongs to
-// that result. The others vanished; each must lie in some result. An input that lies in a result never hurts it: the
-// union stays the same, and it touches whatever covers it. So a vanished input matters only to results that need it,
-// either to hold a particle that nothing else explains or to link others; and only among those is there a choice.
+// Finds from the sets alone which clusters of the input became which cluster of the result. A number of the result is
+// the number of one of its inputs, and a cluster is used once, so an input whose number survives belongs to that
+// result. The others vanished; each must lie in some result. An input that lies in a result never hurts it: the union
+// stays the same, and it touches whatever covers it. So a vanished input matters only to results that need it, either
+// to hold a particle that nothing else explains or to link others; and only among those is there a choice.
 class MergeDecomposition {
  public:
   MergeDecomposition(const TissueGraph& graph, const Clusters& before, const Clusters& after, int64_t tau)
@@ -150,9 +150,9 @@ class MergeDecomposition {
         for (const int32_t r : candidates) possible[at(r)].push_back(c);
       }
     }
-    std::vector<int32_t> needy;  // results that what is certainly theirs does not explain
+    std::vector<int32_t> needy;  // results that their certain inputs do not explain
     for (int32_t r = 0; r < after_.count(); ++r) {
-      if (given_[at(r)].size() == 1 && is_unchanged(r)) continue;  // its only input is what it is
+      if (given_[at(r)].size() == 1 && is_unchanged(r)) continue;  // equal to its only input
       if (explains(r, given_[at(r)])) continue;
       std::vector<int32_t> all = given_[at(r)];
       all.insert(all.end(), possible[at(r)].begin(), possible[at(r)].end());
@@ -178,8 +178,8 @@ class MergeDecomposition {
     violate(verdict, {numbers}, "these clusters can be explained one by one, but only by using a cluster twice");
   }
 
-  // Whether there is a particle of which not all needy results that lack it can be given an input of their own that
-  // holds it (a matching, found by augmenting paths). That there is none proves nothing.
+  // Whether for some particle, the needy results that lack it cannot all be given an input of their own that contains
+  // it (a matching, found by augmenting paths). The absence of such a particle proves nothing.
   bool is_refuted(const std::vector<int32_t>& needy) {
     Lists inputs_of(at(graph_.particle_count()));  // of open_
     for (const int32_t c : open_) {
@@ -229,7 +229,7 @@ class MergeDecomposition {
     return false;
   }
 
-  // By what it was given, and all of open_ from k on that it could use. No, too, once the budget is spent.
+  // By its given inputs, and all of open_ from k on that it could use. Also no when the budget is spent.
   bool can_be_explained(int32_t r, std::size_t k) {
     if (--budget_ < 0) return false;
     std::vector<int32_t> inputs = given_[at(r)];

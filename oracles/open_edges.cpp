@@ -22,7 +22,7 @@ constexpr double kStretchBand = 16;  // [u]
 // Of a bare graph the rest length is a distance as well, computed in double precision on both sides: 2 · 4u more.
 constexpr double kRestBand = 8;  // [2⁻⁵³]
 
-// So many things that rounding decides are tried in all combinations.
+// Greatest number of inconclusive decisions that are tried in all combinations.
 constexpr std::size_t kMostTried = 12;
 
 }  // namespace
@@ -130,7 +130,7 @@ const OneEndOfEach::Edge* OneEndOfEach::edge_that_removes(int32_t i, const Value
   return nullptr;
 }
 
-// All that rounding decides and the particle's fate depends on: which of its edges are open, on which side their ends
+// All inconclusive decisions that the particle's fate depends on: which of its edges are open, on which side their ends
 // are and which is nearer to the blade, and how many open edges the other ends have.
 std::vector<int32_t> OneEndOfEach::bits_of(int32_t i) const {
   std::vector<int32_t> bits = {side_bit_[at(i)]};

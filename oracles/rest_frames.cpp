@@ -22,7 +22,7 @@ void check_rest_frames(Judged& judged, Verdict& verdict) {
     if (members.empty()) continue;  // coverage rejects it
     ++verdict.checked;
     const ClusterMeans means = cluster_means(weighted, judged.clusters, judged.state.x, c);
-    double arms = 0, longest = 0, heaviest = 0, farthest = 0;  // Σ w |X − X of the first member|, and what is greatest
+    double arms = 0, longest = 0, heaviest = 0, farthest = 0;  // Σ w |X − X of the first member|, and the greatest term
     for (const int32_t i : members) {
       const double w = weighted.weight[at(i)];
       const double arm = w * norm(weighted.position[at(i)] - weighted.position[at(members.front())]);

@@ -18,7 +18,7 @@ namespace {
 // 1 − cos 45°. A rotation that is off by less takes each of the six grid directions nearer to where that neighbour is
 // than to where any other is; one that is off by more makes a step exchange them.
 const double kHalfARightAngle = 1 - std::numbers::sqrt2 / 2;
-// What is asked of a rotation, given its matrix, in single precision (method.md, Hard cases), in units of u.
+// Required accuracy of a rotation for its matrix, in single precision (method.md, Hard cases), in units of u.
 constexpr double kGap = 1e-6 * 0x1p24;
 // Below that a rotation is told from its transpose by no more than chance.
 constexpr double kFarNearer = 0x1p-10;

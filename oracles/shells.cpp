@@ -1,4 +1,4 @@
-// Shells of the skin and cavities of the tissue, by joining what touches.
+// Shells of the skin and cavities of the tissue, by joining touching triangles and nodes.
 #include "oracles/shells.h"
 
 #include <algorithm>
@@ -86,7 +86,7 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
   const WeightedRest weighted = weighted_rest(body, clusters);
   const double u = unit_roundoff(state) + kUnitRoundoff;
   std::vector<ClusterMeans> means;
-  std::vector<double> center_rounding;  // what the sum of a cluster's center rounds: squares [m²]
+  std::vector<double> center_rounding;  // rounding of the sum of a cluster's center: squares [m²]
   std::vector<double> absolute;         // both centers of a cluster, as absolute coordinates: at most [m]
   for (int32_t c = 0; c < clusters.count(); ++c) {
     means.push_back(cluster_means(weighted, clusters, state.x, c));
@@ -105,7 +105,7 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
     const double sum = sum_rounds(static_cast<double>(members.size())) * u * spread;
     center_rounding.push_back(4 * u * u * dot(mean, mean) + 3 * sum * sum + 3 * u * u * radius * radius);
     const double weights = sum_rounds_at_most(static_cast<double>(members.size()), means[at(c)].mass, heaviest);
-    absolute.push_back(2 * absolute_mean_rounding(state, weights));  // now and at rest
+    absolute.push_back(2 * absolute_mean_rounding(state, weights));  // deformed and at rest
   }
   std::vector<VertexPlace> places(skin.owner.size());
   for (std::size_t v = 0; v < places.size(); ++v) {

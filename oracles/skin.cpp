@@ -196,7 +196,8 @@ void check_skin_vertices(Judged& judged, Verdict& verdict) {
     if (memberships.of(owner).empty())
       return fail(verdict, {{}, {owner}, {}, around(v)}, "particle {} owns vertex {} and lies in no cluster", owner, v);
   }
-  // What the state alone says of where they lie on their edges: a cut's, only that they lie on them.
+  // Places of vertices along their edges that the state alone determines; vertices of a cut only have to lie on their
+  // edges.
   const double u = unit_roundoff(state);
   for (std::size_t v = 0; v < skin.owner.size(); ++v) {
     const bool opened = body.neighbour(skin.owner[v], skin.direction[v]) >= 0;

@@ -1,4 +1,4 @@
-// Split (method.md §5): exactly the components of what is left of each cluster.
+// Split (method.md §5): exactly the components of the rest of each cluster.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 namespace cutproof::oracles {
 namespace {
 
-// What must come out of a split, found from the definition.
+// The result of a split, from the definition.
 struct ExpectedCluster {
   int64_t number = 0;  // may leave the range of numbers, and then no cluster can have it
   int32_t parent = 0;  // index of the cluster it comes from
@@ -20,7 +20,7 @@ struct ExpectedCluster {
   std::vector<int32_t> members;
 };
 
-// What is left alive of a cluster, ascending.
+// The living members of a cluster, ascending.
 std::vector<int32_t> left_of(const TissueGraph& graph, std::span<const int32_t> members) {
   std::set<int32_t> left;
   for (const int32_t i : members) {
@@ -70,7 +70,7 @@ std::vector<ExpectedCluster> expected_split(const TissueGraph& graph, const Clus
   return expected;
 }
 
-// Why a cluster is not the one that was expected under its number. `left`: what is left of the old cluster.
+// Why a cluster is not the one expected under its number. `left`: the rest of the old cluster.
 void tell_difference(Verdict& verdict, int32_t number, const std::vector<int32_t>& expected,
                      std::span<const int32_t> found, const std::vector<int32_t>& left) {
   if (expected.empty()) return violate(verdict, {{number}}, "cluster {} was empty and is not", number);
@@ -131,7 +131,7 @@ void check_split_exactness(const StageRun& run, Verdict& verdict) {
   const TissueGraph graph(setup.body, after.alive);
   const std::vector<ExpectedCluster> expected = expected_split(graph, before.clusters);
   const Clusters& found = after.clusters;
-  // A cluster that must have come out, and did not: where it comes from, and what there is instead.
+  // A missing cluster: its origin, and the cluster found instead.
   const auto tell_missing = [&](const ExpectedCluster& cluster) {
     const auto number = static_cast<int32_t>(cluster.number);
     const int32_t parent = before.clusters.number[at(cluster.parent)];

@@ -1,4 +1,4 @@
-// What one frame of the step stage must keep: linear momentum, of all tissue and of each of its components.
+// Conservation of linear momentum in one frame of the step stage, of all tissue and of each component.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -18,7 +18,7 @@ namespace {
 struct Balance {
   Totals before, after;
   Vec3 expected;      // momentum at the end: p is damped with v and gains M g dt in each substep
-  double gained = 0;  // what gravity adds to magnitudes
+  double gained = 0;  // gravity's part of the magnitudes
   double squared_clusters = 0, squared_particles = 0;  // sums of squares of masses
   int64_t particles = 0;
   int32_t first = -1;  // particle
@@ -59,7 +59,7 @@ std::vector<Balance> balances_of(const StageRun& run, const Partition& parts) {
   return balances;
 }
 
-// The greatest number that arithmetic works on for a goal: what is stored of a place, and an arm of a cluster [m].
+// The greatest operand in computing a goal: a stored place, or an arm of a cluster [m].
 double stored_extent(const Setup& setup, const State& state) {
   double farthest = 0, arm = 0;
   for (int32_t i = 0; i < setup.body.particle_count(); ++i) {
@@ -91,7 +91,7 @@ class MomentumRounding {
                     std::max(scale_.extent, rounding_scale(run.setup, run.after).extent)),
         dt_(run.setup.substep_length[at(run.before.frame)]) {}
 
-  // `impulse`: what contacts, pins and grips have given, in all.
+  // `impulse`: the total of contacts, pins and grips.
   double bound(const Balance& balance, double impulse) const {
     const double magnitude =
         static_cast<double>(balance.before.speed) + static_cast<double>(balance.after.speed) + balance.gained + impulse;
@@ -140,10 +140,9 @@ void check_momentum(const StageRun& run, Verdict& verdict) {
       figure_beside(q.x, expected.x), figure_beside(q.y, expected.y), figure_beside(q.z, expected.z));
 }
 
-// No force joins what is not connected, and the clusters of a component pull at nothing but that component: its
-// momentum balances by itself. Only the whole body's impulse is known, so this is asked of components that no grip
-// holds, along each axis on which nothing has pushed: nothing can, or all that can pushes to one side and the impulse
-// is 0.
+// No force joins separate components, and the clusters of a component pull at that component alone, so the momentum of
+// each component balances. Only the whole body's impulse is known, so this is asked of components that no grip holds,
+// along each axis on which nothing has pushed: nothing can, or all that can pushes to one side and the impulse is 0.
 void check_component_momentum(const StageRun& run, Verdict& verdict) {
   if (schedule_is_over(run, verdict)) return;
   const Partition components = components_of_graph(TissueGraph(run.setup.body, run.before.alive));

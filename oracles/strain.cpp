@@ -1,6 +1,6 @@
-// Principal stretches of clusters: the greatest singular value of F = A A0⁺, with A = Σ w (x - t)(X - T)ᵀ and
-// A0 = Σ w (X - T)(X - T)ᵀ, w = m / n (method.md §4). In extended precision, so that only the rounding of what is
-// judged is left.
+// Principal stretches of clusters: the greatest singular value of F = A A0⁺, with A = Σ w (x - t)(X - T)ᵀ and A0 = Σ w
+// (X - T)(X - T)ᵀ, w = m / n (method.md §4). In extended precision, so that only the rounding of the judged values is
+// left.
 #include "oracles/strain.h"
 
 #include <Eigen/Core>
@@ -40,7 +40,7 @@ constexpr long double kTerms = 8, kSweeps = 64;
 
 struct ClusterStretch {
   long double stretch = 0, band = 0;
-  bool is_open = false;  // what is flat, or whether it can be computed at all
+  bool is_open = false;  // which direction is flat, or whether it can be computed at all
 };
 
 ClusterStretch stretch_of_cluster(const WeightedRest& rest, const State& state, int32_t cluster, double u) {

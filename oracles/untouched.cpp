@@ -1,4 +1,4 @@
-// Nothing but what a stage may change has changed (method.md §9), field by field, bit by bit (model/fields.h).
+// A stage has changed only fields that it may change (method.md §9), field by field, bit by bit (model/fields.h).
 #include <fmt/format.h>
 
 #include "oracles/checks.h"
@@ -29,8 +29,7 @@ void compare(const Field& field, const T& before, const T& after, const State& n
   }
 }
 
-// A step moves what is alive, and starts the frame's lists anew. The dead keep the place and the velocity with which
-// they died.
+// A step moves living particles, and clears the frame's lists. Dead particles keep their last place and velocity.
 void check_conditions_of_step(const StageRun& run, Verdict& verdict) {
   const State &before = run.before, &after = run.after;
   for (std::size_t i = 0; i < before.alive.size(); ++i) {

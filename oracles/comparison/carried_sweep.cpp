@@ -147,7 +147,7 @@ void CarriedSweep::add_strip(const Row& from, const Row& to) {
 void CarriedSweep::add(const State& before, const State& after) {
   if (!wants(before.frame)) return;
   if (!well_formed(setup_, before).holds || !well_formed(setup_, after).holds) {
-    reached_ = {};  // what comes after must not go on across the gap
+    reached_ = {};  // the next piece must not continue across the gap
     return;
   }
   const Tissue tissue(setup_.body, before, after);

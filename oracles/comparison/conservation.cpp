@@ -50,7 +50,7 @@ struct FreeTotals : Totals {
   Vec3 angular_momentum() const { return vector(spin, 1) - cross(center(), total_momentum()); }
 };
 
-// What is not a number is infinitely much.
+// NaN counts as infinite.
 void raise(double& greatest, double value) {
   greatest = std::max(greatest, std::isfinite(value) ? value : std::numeric_limits<double>::infinity());
 }

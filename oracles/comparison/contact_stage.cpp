@@ -40,7 +40,7 @@ class ContactStage::Linear {
   // Whether it is the derivative itself, and positive definite.
   bool is_exact() const { return is_exact_; }
 
-  // What has to be added to t [m], where it is off its clusters' means by `left` [m].
+  // The correction of t [m], where it is off its clusters' means by `left` [m].
   std::vector<Vec3> step(const std::vector<double>& mass, const std::vector<Vec3>& left) {
     Eigen::VectorXd right(static_cast<Eigen::Index>(3 * left.size()));
     for (std::size_t c = 0; c < left.size(); ++c) {
@@ -164,7 +164,7 @@ ContactStage::ContactStage(const SubstepProblem& problem)
     : problem_(problem), mass_(at(problem.clusters.count()), 0.0) {
   double extent = 0;
   for (const Vec3& x : problem.predicted) extent = std::max(extent, norm(x));
-  // What rounds x is as many times greater in y as that lies farther off.
+  // Rounding of x is amplified in y by the ratio of both distances.
   at_rest_ = std::max(kAtRest * problem.body.grid.spacing, kRestRounds * kUnitRoundoff * extent) / problem.share;
   for (int32_t c = 0; c < problem.clusters.count(); ++c) {
     for (const int32_t i : problem.clusters.of(c)) mass_[at(c)] += problem.rest.weight[at(i)];

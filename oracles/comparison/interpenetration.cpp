@@ -49,7 +49,7 @@ Pieces pieces_of(const Setup& setup, const State& state) {
   return pieces;
 }
 
-// Where more than one component may be: around what the boxes of two have in common. Empty if there is nothing.
+// Where more than one component may be: around the intersection of the boxes of two. Empty if there is none.
 Box shared_region(const Pieces& pieces) {
   std::vector<Box> box(at(pieces.count));
   for (std::size_t t = 0; t < pieces.triangles.size(); ++t) {
@@ -151,8 +151,8 @@ void add_skins(const Pieces& pieces, const Lattice& lattice, std::vector<Stretch
   }
 }
 
-// Lengths, over all lines, of what lies in more than one component, and of that of which the column around the line may
-// be of another opinion: where more than one component is present and the skin of one of them passes.
+// Lengths, over all lines, inside more than one component, and of the uncertain part: where more than one component is
+// present and a skin passes through the column around the line.
 struct Lengths {
   double shared = 0, doubtful = 0;
 };

@@ -46,8 +46,8 @@ double greatest_change(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
 
 // --- For fixed rotations: E over x and t together --------------------------------------------------------------------
 
-// The factor of a substep's system along one axis. That it is made anew for every substep and every set of fixed
-// particles is what was measured to be best (docs/design/decisions.md, Reference solutions are factorised anew).
+// The factor of a substep's system along one axis. Factorising again for every substep and every set of fixed particles
+// was measured to be fastest (docs/design/decisions.md, Reference solutions are factorised anew).
 std::shared_ptr<const Factor> factorised(const Sparse& matrix, Cholmod& cholmod) {
   auto factor = std::make_shared<const Factor>(cholmod_analyze(matrix.get(), cholmod.get()), cholmod);
   cholmod_factorize(matrix.get(), factor->get(), cholmod.get());
@@ -129,9 +129,9 @@ class LinearStage {
     return back(i, axis, (1 - problem_.s) * problem_.predicted_ahead[at(i)][axis] + problem_.s * goal);
   }
 
-  // One coordinate of all particles. Particles that stand on a wall are fixed there; the rest is solved; who stands
-  // on a wall is asked anew: exactly those whose free optimum, given t, lies beyond it (Hintermüller, Ito and Kunisch
-  // 2002, primal-dual active set; it converges monotonically here, because the matrix is an M-matrix).
+  // One coordinate of all particles. Particles on a wall are fixed there, and the others are solved. The new set on the
+  // wall has exactly the particles whose free optimum, given t, lies beyond it (Hintermüller, Ito and Kunisch 2002,
+  // primal-dual active set; it converges monotonically here, because the matrix is an M-matrix).
   void minimise(int axis, const std::vector<Vec3>& turned, std::vector<Vec3>& x) {
     for (int round = 0; round < kMostActiveSets; ++round) {
       std::vector<double> right(at(problem_.clusters.count()), 0.0);
@@ -158,8 +158,8 @@ class LinearStage {
   std::array<std::shared_ptr<const Factor>, 3> factor_;
 };
 
-// Where the substep comes to rest, by fixed rotations and then rotations anew. `rest`: positions at rest for these
-// rotations; none: there are none.
+// The fixed point of the substep, by alternating positions and rotations. `rest`: the fixed point for given rotations,
+// or none.
 template <class AtRest>
 ReferenceSolution alternated(const SubstepProblem& problem, std::vector<Vec3> first, const std::vector<Mat3>& previous,
                              const AtRest& at_rest) {

@@ -39,7 +39,7 @@ std::optional<SolverError> solver_error(Backend& judged, const Setup& setup, con
   error.converged = answer.converged;
   error.elsewhere = answer.elsewhere;
 
-  // What is judged begins where the solution does: at the state as the backend holds it, which may be rounded.
+  // The backend and the solution begin at the same state, as the backend holds it, which may be rounded.
   const State end = after_frame(judged, one, start);
   error.position = measurable(one, end) ? position_error(one, answer.x, end.x, start.alive) : infinite_error();
   const double least = answer.energy;

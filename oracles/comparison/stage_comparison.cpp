@@ -47,8 +47,8 @@ void note_if_any(MeasuredError& error, const ErrorNorm& norm) {
   if (norm.max > 0) error.norm = norm;
 }
 
-// What is computed and what the stage must leave as it is, to the bit. Positions and velocities of what is alive are
-// measured instead; the dead keep theirs.
+// Computed fields that the stage must leave unchanged, to the bit. Positions and velocities of living particles are
+// measured instead; dead particles keep theirs.
 std::optional<DecisionDifference> difference_of_kept(const StageDifference& stage, const State& before,
                                                      const State& after) {
   std::optional<DecisionDifference> found;
@@ -109,7 +109,7 @@ RestFrameComparison compare_rest_frames(const Setup& setup, const State& state) 
   const WeightedRest rest = weighted_rest(setup.body, clusters);
   RestFrameComparison found;
   int64_t largest = 0;
-  double absolute = 0;  // what absolute coordinates round
+  double absolute = 0;  // rounding of absolute coordinates
   for (int32_t c = 0; c < clusters.count(); ++c) {
     const ClusterMeans fresh = cluster_means(rest, clusters, rest.position, c);
     found.center.norm.add(norm(clusters.rest_center[at(c)] - fresh.rest) / setup.body.grid.spacing, c);
@@ -275,9 +275,9 @@ void StageComparison::compare_later_stage(const State& before, const State& afte
     MeasuredError& skin = found.error(Measure::skin);
     const std::vector<FieldError> errors = errors_of_fields(setup_, expected, after, dt, before.alive);
     skin.norm = error_of(errors, "skin_position");
-    // Where they lie on their edges shows in their places, unless one of the two is not what it says.
+    // Reaches show in positions, unless a vertex's position and reach disagree.
     if (const ErrorNorm& reach = error_of(errors, "reach"); !(reach.max <= skin.norm.max)) skin.norm = reach;
-    // Far from where it rests, single precision cannot have what is asked: then what rounding does is.
+    // Far from rest, single precision cannot have the required accuracy: then the effect of rounding is the bound.
     for (const VertexPlace& vertex :
          vertex_places(setup_, after, after.skin, memberships_of(after.clusters, setup_.body.particle_count()))) {
       skin.bound = std::max(skin.bound, vertex.bound / setup_.body.grid.spacing);

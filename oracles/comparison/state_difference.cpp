@@ -158,7 +158,7 @@ std::optional<DecisionDifference> difference_of_field(const Field& field, const 
 
 // --- What is computed ------------------------------------------------------------------------------------------------
 
-// What errors are divided by.
+// Units of errors.
 struct Scale {
   double spacing;  // h [m]
   double dt;       // [s]
@@ -261,7 +261,7 @@ std::optional<DecisionDifference> difference_of_decisions(const State& expected,
   std::optional<DecisionDifference> found;
   for (const bool derived : {false, true}) {
     for (const unsigned parts : kOrderOfDecisions) {
-      bool looked = false;  // at what is compared together
+      bool looked = false;  // at fields that are compared together
       for_each_field([&](const Field& field, auto get) {
         if (found || looked || !field.is_decision || (field.part & parts) == 0) return;
         if (derived == field.derived_from.empty() || same_bits(get(expected), get(actual))) return;

@@ -17,7 +17,7 @@ void require(bool condition, const char* what) {
   if (!condition) throw std::invalid_argument(std::string("the reference solution of a substep: ") + what);
 }
 
-// What the substep is made of, checked before anything is computed from it.
+// The input of the substep, checked before use.
 const Setup& checked(const Setup& setup, const State& state) {
   require(setup.step.solver == Solver::implicit, "only the implicit solver has one");
   require(0 <= state.frame && state.frame < setup.frame_count(), "the state's frame is not in the schedule");

@@ -90,7 +90,7 @@ std::vector<ShownStep> shown_iterates(Backend& backend, std::span<const IterateP
     return states.size() - 1;
   };
   std::vector<ShownStep> shown(probes.size());
-  // Bodies in which probes begin a frame: what they hold once they are loaded is kept.
+  // Bodies in which probes begin a frame, with their states after loading.
   const auto run = [&](const std::vector<std::size_t>& first) {
     std::vector<bool> wanted(setups.size());
     for (const std::size_t body : first) wanted[body] = true;
@@ -151,7 +151,7 @@ std::vector<ShownStep> shown_iterates(Backend& backend, std::span<const IterateP
       if (wanted.iterations == probes[p].setup_.step.iterations) begin[p] = all[k];
     }
   }
-  // Single precision loses what is carried from one substep to the next, where it is loaded between them.
+  // In single precision, loading between substeps loses digits that the backend carries between them.
   if (backend.precision() == Precision::binary64) {
     for (const IterateProbe& probe : probes) add(probe.setup_, probe.before_, probe.before_.frame);
     std::vector<State> whole = run({});

@@ -19,7 +19,7 @@ namespace {
 
 // Bounds are so many times the quadratic sum of single roundings: of one place or rotation, and of sums over many.
 constexpr double kTimes = 4, kTimesOfSums = 8;
-// Numbers round alike that agree to so many roundings: what has rounded before makes them differ.
+// Numbers that agree within so many roundings round alike: earlier roundings make them differ.
 constexpr double kEqualRounds = 256;
 // Entries of RᵀR - I, in units of u: R is made of a unit quaternion, whose length is off by 2 u, which is 8 u in them;
 // its entries round by 4 u more, which is 2 √3 times that.
@@ -30,7 +30,7 @@ constexpr int kTries = 256;
 // Where the first of these are farther apart than this [h], turns of blade and walls lead anywhere, but no more than so
 // many times as far again.
 constexpr double kAnywhere = 1e-3, kFarther = 8;
-// What single precision makes of a smaller number may be 0 (a velocity times dt [m], what damping leaves of it).
+// A smaller number may be 0 in single precision (a velocity times dt [m], also after damping).
 constexpr double kLeast = 1e-37;
 
 double square(double a) { return a * a; }
@@ -260,7 +260,7 @@ void SubstepJudge::iteration(int32_t k, const State* earlier, const State& now, 
              next.x[at(i)], now.x[at(i)]);
   }
   sums();
-  // The recurrence of what contacts have pushed so far, from what the backend states of it.
+  // The recurrence of the pushes of contacts so far, from the backend's own values.
   const auto of = [&](const State& state) { return (dt_ / decay_) * state.impulse; };
   Vec3 carried = (implicit_ ? s_ : 1.0) * of(now);
   double rounding = 8 * u_ * norm(of(now)) * (1 + 2 * pull);
@@ -411,9 +411,9 @@ double SubstepJudge::nearest_contact(int32_t i, const Candidate& candidate, Vec3
   }
   const uint8_t explained_directly = explained;
   const double best_directly = best;
-  // Beside a border a candidate within its rounding may lead elsewhere: the one that the blade alone has led here, or
-  // one of many, with what rounds between turns of blade and walls. So may it from a side that has explained nothing
-  // yet.
+  // Beside a border a candidate within its rounding may lead elsewhere: the candidate led by the blade alone, or one of
+  // many, with the rounding between turns of blade and walls. The same holds for a side that has explained nothing so
+  // far.
   best = std::numeric_limits<double>::infinity();
   double spread = 0;
   for (std::size_t k = 0; k < count; ++k) {
@@ -522,7 +522,7 @@ void SubstepJudge::sums() {
     part.along_squares += square(along);
     begin = end;
   }
-  if (k_ >= 0) {  // what members have in common of a cluster
+  if (k_ >= 0) {  // common to the members of a cluster
     for (int32_t c = 0; c < began_.clusters.count(); ++c) {
       const auto members = began_.clusters.of(c);
       if (members.empty()) continue;

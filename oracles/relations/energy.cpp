@@ -62,7 +62,7 @@ Verdict energy_is_monotone(Backend& backend, const Setup& setup, const State& gi
       const double evaluation =
           rho * (ahead / dt) * (std::sqrt(2 * mass * energy / (dt * ahead)) + std::sqrt(2 * k * mass * energy)) +
           terms * kUnitRoundoff * energy;
-      // E is isotropic in each particle: what a place was allowed to be worse.
+      // E is isotropic in each particle: the allowed increase of a place.
       double raised = 0;
       for (std::size_t i = 0; i < end.x.size(); ++i) {
         if (state.alive[i] == 0) continue;

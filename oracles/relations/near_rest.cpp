@@ -28,7 +28,7 @@ State at_rest(const Setup& setup, const State& state, Vec3 velocity) {
   return rest;
 }
 
-// Takes one substep from rest with this velocity, in which `free` says what acts, and expects the body to move rigidly.
+// Takes one substep from rest with this velocity and the forces of `free`, and expects a rigid motion.
 Verdict throw_body(const Relation& relation, Backend& backend, const Setup& setup, const State& given, Vec3 velocity,
                    void (*free)(StepParameters&), bool also_velocities, fmt::format_string<int32_t&, Figure> text) {
   const State state = in_arithmetic_of(backend, given);
@@ -42,7 +42,7 @@ Verdict throw_body(const Relation& relation, Backend& backend, const Setup& setu
     for (Vec3& v : moved.v) v += dt * one.step.gravity;
     for (std::size_t i = 0; i < moved.x.size(); ++i) moved.x[i] += dt * moved.v[i];
     const State end = after(backend, one, start, step_span(backend));
-    // The answer is known; what rounding does to it is what it does to the step.
+    // The answer is known; its rounding is that of the step.
     const StepAgain again = step_again(one, start, end);
     if (!again.step) return fail(verdict, {}, "{}", again.verdict.witness.text);
     Nearest nearest;

@@ -1,4 +1,4 @@
-// What a stroke has separated stays separate.
+// Pieces that a stroke has separated stay separate.
 #include "oracles/oracles.h"
 #include "oracles/relations/relations.h"
 #include "oracles/relations/shared.h"

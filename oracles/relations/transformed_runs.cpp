@@ -15,7 +15,7 @@
 namespace cutproof::oracles {
 namespace {
 
-// The span in pieces, so that what merging and expansion may decide differently is judged where it happens.
+// The span in pieces, so that different choices of merging and expansion are judged where they happen.
 std::vector<Span> pieces_of(const Backend& backend, Span span) {
   std::vector<Span> pieces;
   const auto add = [&](Stage first, Stage last) {
@@ -34,7 +34,7 @@ std::vector<Span> pieces_of(const Backend& backend, Span span) {
 }
 
 struct Tolerance {
-  double position = 0;  // [m], also of velocities times dt and of what a rotation does to a member
+  double position = 0;  // [m], also of velocities times dt and of places that a rotation gives members
   double skin = 0;      // [m]
   double velocity = 0;  // [m/s]
   double impulse = 0;   // [kg m/s]
@@ -46,7 +46,7 @@ std::vector<int32_t> members_of(const Clusters& clusters, int32_t c) {
   return {members.begin(), members.end()};
 }
 
-// Several clusters may have the same members: what is left of two after a cut.
+// Several clusters may have the same members: the rests of two after a cut.
 std::multimap<std::vector<int32_t>, int32_t> places_by_members(const Clusters& clusters) {
   std::multimap<std::vector<int32_t>, int32_t> places;
   for (int32_t c = 0; c < clusters.count(); ++c) places.emplace(members_of(clusters, c), c);
@@ -289,7 +289,7 @@ struct TransformedRuns {
   // The transformed state in which a piece began.
   const State& before(std::size_t piece) const { return piece == 0 ? transformed_state : transformed[piece - 1]; }
 
-  // What rounding may do to numbers, if disturbances of positions grow by `growth`.
+  // Effect of rounding on numbers, if disturbances of positions grow by `growth`.
   Tolerance tolerance(double growth) const {
     RoundingScale scale = rounding_scale(scene.setup(), transformed.back());
     const RoundingScale first = rounding_scale(scene.setup(), transformed_state);
@@ -341,7 +341,7 @@ std::optional<Witness> illegal_clusters(const TransformedRuns& runs, std::size_t
   return legal && !legal->holds ? std::optional(legal->witness) : std::nullopt;
 }
 
-// Both runs, piece by piece, up to rounding and ties. True: what fails are numbers and nothing else.
+// Both runs, piece by piece, up to rounding and ties. True: only numbers fail.
 bool compare_runs(Verdict& verdict, const std::string& how, const TransformedRuns& runs, const Tolerance& tolerance,
                   uint64_t seed) {
   const Setup& setup = runs.scene.setup();

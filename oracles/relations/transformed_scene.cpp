@@ -153,7 +153,7 @@ void sort_members(Clusters& clusters) {
 
 }  // namespace
 
-// One value of a field, by what it is.
+// One value of a field, by its kind.
 template <class T>
 T TransformedScene::value(Quantity quantity, const T& given) const {
   if constexpr (std::is_same_v<T, Vec3>) {

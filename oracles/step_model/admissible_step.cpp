@@ -22,7 +22,7 @@ namespace {
 // Without growth: within this multiple of the quadratic sum of single roundings, a particle is accepted, because
 // disturbed runs would allow more (tolerances.md, The step again).
 constexpr double kSurely = 2;
-// Of what clusters share, so much is left where they overlap when it is taken away once.
+// Part of the shared motion of clusters that remains where they overlap after it is subtracted once.
 constexpr double kNotShared = 0.125;
 // Disturbed runs, from fixed seeds; as many before anything is called wrong; and how much farther than the farthest of
 // them a right answer may be.
@@ -41,7 +41,7 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 // Farther than any bound where it is not a number.
 double or_infinite(double x) { return std::isnan(x) ? kInfinite : x; }
 
-// How far apart rotations put what is a unit away.
+// Distance of the images of a point at unit distance under both rotations.
 double apart(const Mat3& a, const Mat3& b) {
   double square = 0;
   for (std::size_t k = 0; k < 9; ++k) square += (a.m[k] - b.m[k]) * (a.m[k] - b.m[k]);
@@ -51,7 +51,7 @@ double apart(const Mat3& a, const Mat3& b) {
 // Of one outcome: bounds, or how far another is from it.
 struct Bounds {
   std::vector<double> position, velocity;          // [n] [m], [m/s] times dt
-  std::vector<double> own_position, own_velocity;  // the same, less what clusters share
+  std::vector<double> own_position, own_velocity;  // the same, less the shared motion of clusters
   std::vector<double> rotation;                    // [m] [rad]
   double impulse = 0;                              // [kg m/s]
 
@@ -143,7 +143,7 @@ class Judge {
     return model_.run({disturbance, open, side_of_end_, given_});
   }
 
-  // The undisturbed run, and what its single roundings add up to as if none of them grew.
+  // The undisturbed run, and the sum of its single roundings as if none of them grew.
   void begin() {
     outcome_ = run(0);
     follow_rotations();
@@ -193,7 +193,7 @@ class Judge {
   }
   // Whether many rotations are the best in the last iteration, and the one that the backend states is not followed.
   bool is_open(std::size_t c) const { return outcome_.is_free[c] != 0 && given_[c] == nullptr; }
-  // How far a rotation is from what all best rotations of this shape agree on: they turn v to u.
+  // Deviation of a rotation from the common property of all best rotations of this shape: they turn v to u.
   static double off_agreed(const Mat3& shape, const Mat3& r) {
     const BestRotation best = best_rotation(shape);
     const Vec3 u = {best.u[0], best.u[1], best.u[2]}, v = {best.v[0], best.v[1], best.v[2]};
@@ -268,7 +268,7 @@ class Judge {
     return spread;
   }
 
-  // What rounding does to this outcome.
+  // The effect of rounding on this outcome.
   void look_closer(uint64_t runs) {
     Spread spread = spread_of(runs, {});
     bounds_.combine(spread.off, [](double, double farthest) { return kBeyondRuns * farthest; });
@@ -370,7 +370,8 @@ class Judge {
   // Of a particle's velocity nothing sharp is asked, or of its place neither.
   bool is_blunt(std::size_t i) const { return blunt_[i] != 0 || !(bounds_.velocity[i] <= kSmall * h_); }
 
-  // What was only asked bluntly is counted as undecided where it holds, and says nothing of how sharp the judge is.
+  // A quantity with a coarse bound counts as undecided where it holds, and does not count in the sharpness of the
+  // judge.
   void see(StepPart part, int32_t where, double measured, double bound, bool blunt = false) {
     if (blunt && measured <= bound) return;
     const double ratio = measured <= bound ? (bound > 0 ? measured / bound : 0) : kInfinite;
@@ -483,7 +484,7 @@ class Judge {
   std::vector<double> direction_;    // [m] how far rounding turns what all best rotations agree on; empty: not known
   std::vector<uint8_t> blunt_;       // [n] 1: only asked bluntly
   std::vector<int32_t> violations_;  // particles beyond their bounds, or of clusters that are
-  bool is_undecided_ = false;        // by what drawn decisions do
+  bool is_undecided_ = false;        // by the effect of drawn decisions
   double worst_ = -1;                // of measured / bound
   StepPart part_ = StepPart::position;
   int32_t where_ = -1;

@@ -22,10 +22,10 @@
 namespace cutproof::oracles {
 namespace {
 
-// How much single operations round, in units of u times what they work on (tolerances.md, The step again).
+// Rounding of single operations, in units of u times their operands (tolerances.md, The step again).
 constexpr double kRotationRounds = 4;   // a rotation, about each axis, given its matrix
-constexpr double kParameterRounds = 4;  // what is made of parameters once: s, e^(-c dt), Chebyshev's weights
-// Where equal numbers round alike, they are equal to so many roundings: what has rounded before makes them differ.
+constexpr double kParameterRounds = 4;  // constants from parameters: s, e^(-c dt), Chebyshev's weights
+// Equal numbers that round alike are equal within so many roundings: earlier roundings make them differ.
 constexpr double kAlikeRounds = 256;
 // How much ways into the blade's frame and back round, in units of u times the distance from its edge.
 constexpr double kContactRounds = 4;
@@ -162,7 +162,7 @@ int64_t StepModel::evaluations() const {
          static_cast<int64_t>(arm_.size() + weight_.size());
 }
 
-// One run: what changes from substep to substep.
+// One run: the data that change from substep to substep.
 class StepModel::Run {
  public:
   Run(const StepModel& model, const Wanted& wanted)
@@ -237,7 +237,7 @@ class StepModel::Run {
 
   void substep(int32_t s);
   void match_shapes(int32_t s, int32_t j);
-  // `size`: of all terms of A. `noise`: what the rounding of places makes of A.
+  // `size`: of all terms of A. `noise`: the error of A from the rounding of places.
   Mat3 rotation_of(int32_t c, const Eigen::Matrix3d& a, double size, double noise, bool is_last);
   Mat3 one_of_many(BestRotation best, const Mat3& previous, bool all);
   bool keeps_rotation();
@@ -257,7 +257,7 @@ class StepModel::Run {
   int side_of(std::size_t i, const Contact& contacts, Vec3 start, const BladeMove& move);
   Vec3 placed(std::size_t i, Vec3 free, Vec3 start, const Vec3* present, const Contact& contacts, double& raised);
 
-  // What is rounded: of clusters and of particles.
+  // The rounded quantities: of clusters and of particles.
   enum class Rounded : uint8_t { shape, prediction, place, push, end, impulse };
   void round(Rounded what, std::size_t index) {
     noise_.name(static_cast<uint64_t>(what), index, kind_ == Kind::independent ? time_ : 0);
@@ -501,7 +501,7 @@ void StepModel::Run::match_shapes(int32_t s, int32_t j) {
     if (disturbed_) t -= r * rest_off_[at(c)];
     const double center_rounding = 4 * u_ * u_ * dot(center, center) + 3 * mean_amplitude * mean_amplitude;
     if (!disturbed_) {
-      // What all members have in common moves their sum as a whole; a rest center is off in each iteration.
+      // A common error of all members moves their sum as a whole; a rest center is off in each iteration.
       const double rest_amplitude = u_ * ((stores_positions_ ? norm(cluster.rest) : 0) + cluster.radius);
       shared_rounding_ +=
           cluster.mass * cluster.mass * (center_rounding + setup_.step.iterations * rest_amplitude * rest_amplitude);
@@ -675,7 +675,7 @@ void StepModel::Run::substep(int32_t s) {
     round(Rounded::end, i);
     // Exactly, the balance of momentum says the same, with nothing carried on.
     if (!disturbed_) pushed += body_.mass[i] * push;
-    // A backend adds up what contacts do in each iteration.
+    // A backend adds up the pushes of contacts in each iteration.
     if (disturbed_) pushed += body_.mass[i] * noise_.off((carrying * u_) * push, 0);
     out_.v[i] = (decay / dt) * (out_.x[i] - start[i]);
     if (disturbed_) out_.v[i] += noise_.off((kParameterRounds * u_) * out_.v[i], 0);

@@ -171,7 +171,7 @@ void check_skin_geometry(Judged& judged, Verdict& verdict) {
 
   const VolumeRange range = tissue_volume(setup, skin, tissue);
   const auto triangles = static_cast<double>(skin.triangles.size());
-  // What the two bounds add up cell by cell, where vertices have places of their own (tolerances.md).
+  // The terms of both bounds, added cell by cell, where vertices have places of their own (tolerances.md).
   const double cells = lie_alike(skin) ? 0 : 1.25 * triangles;
   const double rounding = (triangles + 512) * kUnitRoundoff * (magnitude + std::abs(range.high) + cells);
   const double outside = std::max(range.low - volume, volume - range.high);
