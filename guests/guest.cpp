@@ -367,7 +367,7 @@ Answer Guest::call(Operation operation, uint32_t instance, Span span, const std:
     std::memset(memory_ + array.first_page, wire::kCanary, at(array.offset - array.first_page));
     std::memset(memory_ + array.offset + bytes, wire::kCanary, at(array.end_page - array.offset - bytes));
     if (argument.data != nullptr && bytes > 0) std::memcpy(memory_ + array.offset, argument.data, at(bytes));
-    // What is not written shows: NaN, -1, 255.
+    // Unwritten values show: NaN, -1, 255.
     if (argument.data == nullptr) std::memset(memory_ + array.offset, 0xff, at(bytes));
   }
   std::memset(memory_ + wire::kFaultOffset, 0, sizeof(wire::Fault));
@@ -433,7 +433,7 @@ Answer Guest::call(Operation operation, uint32_t instance, Span span, const std:
     if (bytes > 0) std::memcpy(got.bytes.data(), memory_ + offset, at(bytes));
     answer.arrays.push_back(std::move(got));
   }
-  // Who refuses has not been anywhere else either.
+  // A guest that refuses has not written out of bounds either.
   if (reply.outcome == wire::Outcome::refused) {
     answer.kind = Answer::Kind::refused;
     answer.text = fmt::format("it refused, with {}", reply.code);

@@ -1,5 +1,5 @@
-// A plugin in a process of its own, asked one operation at a time. Whatever it does there (crashes, hangs, writes where
-// it must not, says what is not so) comes back as an answer.
+// A plugin in a process of its own, asked one operation at a time. Its faults (crashes, hangs, writes out of bounds,
+// false statements) come back as answers.
 #pragma once
 #include <sys/types.h>
 
@@ -26,7 +26,7 @@ struct GuestOptions {
   double time_limit = 10;  // [s] for each call
 };
 
-// What a plugin says of itself.
+// Properties that a plugin states of itself.
 struct PluginInfo {
   std::string name, version;
   std::optional<std::string> promises;  // words separated by spaces
@@ -60,18 +60,18 @@ Array in_precision(const Array& array, Precision precision);
 struct Answer {
   enum class Kind { answered, refused, fault };
   Kind kind = Kind::answered;
-  std::string text;  // what the guest did, where it did not answer
-  Arrays arrays;     // what it answered: in the order of the arguments, those that are not given
+  std::string text;  // the guest's fault, where it did not answer
+  Arrays arrays;     // the answers: the arguments that are outputs, in their order
 };
 
 class Guest {
  public:
-  // Starts the process and has it load the plugin. Throws InputError, naming the library, if that is none or is made
-  // for another version; CannotRunHere; MachineError if no process can be started.
+  // Starts the process and has it load the plugin. Throws InputError, naming the library, if that is no plugin or is
+  // made for another version; CannotRunHere; MachineError if no process can be started.
   explicit Guest(GuestOptions options);
   // A guest that runs already and reads from the other end of `channel`; arrays lie in the file `memory` (wire.h). Both
-  // numbers are of open files, which become the Guest's. It cannot be started anew (has_ended). Throws InputError if
-  // these are no such files, or the guest was made for another version.
+  // numbers are of open files, which become the Guest's. It cannot be restarted (has_ended). Throws InputError if these
+  // are no such files, or the guest was made for another version.
   Guest(int channel, int memory, double time_limit);
   ~Guest();
   Guest(const Guest&) = delete;
@@ -80,11 +80,11 @@ class Guest {
   const PluginInfo& plugin() const { return plugin_; }
 
   // `at_end`: arrays end where memory that may be touched ends; else they begin where it begins. Asked by turns, both
-  // ends are guarded. A guest that was lost is started anew before the next call, with none of its instances.
+  // ends are guarded. A lost guest is restarted before the next call, without its instances.
   Answer call(Operation operation, uint32_t instance, Span span, const std::vector<Argument>& arguments, bool at_end);
   // It is gone for good: nothing more can be asked.
   bool has_ended() const { return attached_ && !running_; }
-  // How often it had to be started anew.
+  // Number of restarts.
   int64_t restarts() const { return restarts_; }
 
  private:

@@ -12,9 +12,9 @@ namespace cutproof::guests {
 inline constexpr const char* kPluginPrefix = "plugin:";
 GuestOptions options_of_name(const std::string& name);
 
-// Frames end here: the plugin need neither count them nor compact numbers, nor empty what was removed in the last one.
-// Its process begins with the backend. Throws what Guest throws, and InputError for a plugin without stages; loading
-// throws Refused where the plugin refuses, and running std::runtime_error with what it did instead of answering.
+// This class ends frames: the plugin need not count them, compact numbers or clear lists of removals. The plugin's
+// process begins with the backend. Throws the exceptions of Guest, and InputError for a plugin without stages. Loading
+// throws Refused where the plugin refuses; running throws std::runtime_error with the plugin's fault.
 std::unique_ptr<Backend> make_plugin_backend(const std::string& name);
 
 }  // namespace cutproof::guests

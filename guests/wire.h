@@ -1,5 +1,5 @@
-// What host and guest say to each other: messages of fixed size over a SOCK_SEQPACKET socket, and arrays in memory that
-// both map. Guests are the program in process/ and python/cutproof.py, which repeats these layouts.
+// The protocol of host and guest: messages of fixed size over a SOCK_SEQPACKET socket, and arrays in memory that both
+// map. Guests are the program in process/ and python/cutproof.py, which repeats these layouts.
 //
 // Memory: kArrayBytes for arrays whose length is known, and behind them kArenaCount arenas of kArenaBytes for outputs
 // that the guest makes longer. The file is sparse; only what is touched costs memory. In the guest every page that
@@ -18,7 +18,7 @@ inline constexpr int64_t kArenaCount = 24;
 inline constexpr int64_t kMemoryBytes = kArrayBytes + kArenaCount * kArenaBytes;
 // Around arrays lie so many bytes out of bounds, or as many as the array has if these are more.
 inline constexpr int64_t kLeastGap = 64 * kPage;
-// What lies around an array on its first and last page.
+// Bytes around an array on its first and last page.
 inline constexpr unsigned char kCanary = 0xc5;
 // Device arrays have so many bytes of canary on both sides.
 inline constexpr int64_t kDeviceCanary = 4096;
@@ -39,7 +39,7 @@ struct Array {
   Role role;
   int64_t rows, columns;
   int64_t offset;      // of its first byte
-  int64_t first_page;  // what may be touched, in bytes, a multiple of kPage
+  int64_t first_page;  // accessible bytes, a multiple of kPage
   int64_t end_page;
   int64_t arena;  // of a grown one; else -1
 };
@@ -59,13 +59,13 @@ enum class Outcome : int32_t {
   answered,
   refused,       // the operation returned Reply::code
   broke_a_rule,  // Reply::text says which; the answer is worth nothing
-  device_failed  // the guest is to be started anew
+  device_failed  // the guest is to be restarted
 };
 
 struct Reply {
   Outcome outcome;
   int32_t code;
-  int64_t rows[kMostArrays];    // of outputs, as they are now
+  int64_t rows[kMostArrays];    // of outputs, after the call
   int64_t offset[kMostArrays];  // of their first bytes
   char text[512];
 };
@@ -111,12 +111,12 @@ constexpr Place place_in_arena(int64_t arena, int64_t bytes, bool at_end) {
 // The most that an arena holds.
 inline constexpr int64_t kMostGrown = kArenaBytes - 2 * kLeastGap - 2 * kPage;
 
-// Where a guest that is killed by a signal leaves what it knows: in the last page of memory.
+// Report of a guest that is killed by a signal, in the last page of memory.
 struct Fault {
   int32_t signal;
   int32_t access;    // 0: not known, 1: read, 2: write
   int32_t array;     // of the request, the nearest one; -1: none is near
-  int64_t distance;  // of what was touched from that array's first byte
+  int64_t distance;  // of the access, from that array's first byte
   int64_t bytes;     // that the array had then
 };
 inline constexpr int64_t kFaultOffset = kMemoryBytes - kPage;

@@ -24,7 +24,7 @@ namespace cutproof::harness {
 
 namespace {
 
-// Preemptions that PCT spreads over so many decisions: about what a frame of a small body has.
+// Number of decisions over which PCT spreads preemptions: about those of a frame of a small body.
 constexpr int kPctDepth = 3;
 constexpr std::int64_t kPctLength = 100'000;
 // Scenes of some ten thousand particles have launches with more decisions than the default budget allows.
@@ -69,9 +69,9 @@ std::unique_ptr<Backend> make_host(const BackendChoice& choice) {
   return gpu::make_host_backend(choice.threads > 0 ? choice.threads : cpu_threads(), {}, of_block);
 }
 
-// Several, so that kernels see more than one body; no more, so that what they work on stays in the caches.
+// Several, so that kernels see more than one body; few, so that their data stay in the caches.
 constexpr int kBodiesOnTheHost = 4;
-// What a device does before its kernels and after them it does for a whole load.
+// Work before and after kernels is done once for a whole batch.
 constexpr int64_t kParticlesOnADevice = 50'000;
 
 // No strings that allocate: this table is there before main() and where there is no memory.
@@ -82,7 +82,7 @@ constexpr std::array kBackends = {
         .precision = Precision::binary64,
         .is_the_reference = true,
         .runs_kernels = false,
-        // It takes body by body, and what a few bodies need stays in the caches.
+        // Bodies run one by one, and the data of a few stay in the caches.
         .bodies_in_a_load = 16,
         .make = [](const BackendChoice&) { return reference::make_backend(); },
     },
@@ -117,7 +117,7 @@ constexpr std::array kBackends = {
         .takes_full_size = true,
         .timed_frames = 20,
         .particles_in_a_load = kParticlesOnADevice,
-        // It is busy with so many loads at once; more only take memory.
+        // This number of concurrent batches keeps the device busy; more only take memory.
         .most_parallel_loads = 6,
         .make = make_gpu<gpu::Path::graph>,
     },

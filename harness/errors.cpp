@@ -64,7 +64,7 @@ void Errors::frame_ends(const State& state) {
   if (wanted_.geometry && sweep_.wants(frame)) sweep_.add(frame_start_, state);
   if (wanted_.geometry && looked_at(frame)) {
     const oracles::Interpenetration found = oracles::interpenetration(setup_, state);
-    // What is not a number stays.
+    // NaN stays.
     if (!overlap_ || !(found.volume <= overlap_->found.volume || std::isnan(overlap_->found.volume))) {
       overlap_ = Overlap{frame, found};
     }

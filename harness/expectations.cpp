@@ -90,7 +90,7 @@ void ExpectationCheck::see(const Moment& moment) {
 ExpectationCheck::Judged ExpectationCheck::judged(const StagesRun& stages) const {
   using enum Stage;
   Judged found;
-  // What of a frame an outcome hangs on. A split removes particles only where it is asked to.
+  // Stages that decide an outcome. A split removes particles only with debris.
   const StageSet removal =
                      setup_.split.debris > 0 ? cutproof::stages(step, detect, split) : cutproof::stages(step, detect),
                  of_skin = {removal.bits | cutproof::stages(skin).bits},
@@ -131,7 +131,8 @@ ExpectationCheck::Judged ExpectationCheck::judged(const StagesRun& stages) const
                  : why);
     if (!measured) found.verdicts.back().holds = false;
   };
-  // What may change until the run ends, unless it `is_final`, and what is too much and will not become less.
+  // A value that may change until the run ends, unless it `is_final`; a value above its limit that cannot decrease
+  // fails at once.
   const auto within = [&](const std::string& what, StageSet decided_by, double measured,
                           const std::optional<Range>& range, const std::string& unit, int64_t frame, bool is_final,
                           bool grows_only) {

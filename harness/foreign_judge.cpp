@@ -18,7 +18,7 @@ namespace cutproof::harness {
 
 namespace {
 
-// What a property needs of a file: one of each list.
+// Arrays that a property needs: one of each list.
 struct Needs {
   std::string_view property;
   std::vector<std::vector<std::string_view>> arrays;
@@ -91,7 +91,7 @@ Verdict malformed(const ForeignState& foreign) {
   return verdict;
 }
 
-// Of what is there, where nothing is known of rest: a single particle far away makes the longest edge what it likes.
+// From present positions where rest is not known: a single distant particle would determine the longest edge.
 double median_edge(const ForeignState& foreign) {
   const Body& body = foreign.setup.body;
   std::vector<double> lengths;
@@ -149,7 +149,7 @@ Verdict plausible_places(const ForeignState& foreign) {
   return verdict;
 }
 
-// Living particles that rest at one place, within what rounds there; where nothing is known of rest, that are there.
+// Living particles with one rest position, within rounding; where rest is not known, with one present position.
 struct Coincident {
   int64_t particles = 0;  // of which another is at the same place
   int32_t first = -1, second = -1;
@@ -234,7 +234,7 @@ void explain_weights(const ForeignState& foreign, Verdict& verdict) {
     if (held[i] > 0)
       setup.body.mass[i] = foreign.plain_weights ? setup.body.mass[i] / held[i] : setup.body.mass[i] * held[i];
   }
-  // What was not given was made of the weights that were asked.
+  // Missing rest frames follow from the requested weights.
   for (int32_t c = 0; c < given.clusters.count(); ++c) {
     double mass = 0;
     Vec3 sum;

@@ -67,7 +67,7 @@ class Reader {
     return value;
   }
 
-  // The coarsest arithmetic of what is given counts for all.
+  // The coarsest precision of the given arrays counts for all.
   void see_type(const Array& array) {
     if (array.type == ElementType::f32) out_.state.precision = Precision::binary32;
   }
@@ -140,12 +140,12 @@ class Reader {
     }
     if (const Array* const alive = in_.find("alive", {n()})) {
       const std::vector<int64_t> flags = in_.long_integers(*alive);
-      // What is neither is found by "well formed".
+      // "well formed" rejects other values.
       for (std::size_t i = 0; i < flags.size(); ++i) {
         state.alive[i] = flags[i] == 0 || flags[i] == 1 ? static_cast<uint8_t>(flags[i]) : uint8_t{2};
       }
     }
-    for (int32_t i = 0; i < n(); ++i) {  // what is gone may be put anywhere
+    for (int32_t i = 0; i < n(); ++i) {  // removed particles may be anywhere
       if (state.alive[at(i)] != 0) see_place(state.x[at(i)]);
     }
     if (const Array* const removed = in_.find("removed", {-1})) {
@@ -367,7 +367,7 @@ class Reader {
     return held;
   }
 
-  // What is not given of rest frames follows from the members, and is not judged.
+  // Missing parts of rest frames follow from the members, and are not judged.
   void fill_rest_frames(const std::vector<int32_t>& held) {
     Clusters& clusters = out_.state.clusters;
     const bool with_centers = clusters.rest_center.empty(), with_masses = clusters.mass.empty();

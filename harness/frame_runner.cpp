@@ -81,7 +81,7 @@ void FrameRunner::hand_over(bool to_backend) {
   if (!to_backend && !reference_) reference_ = reference::make_backend();
   (to_backend ? backend_ : *reference_).load(setups_, states);
   at_backend_ = to_backend;
-  // In single precision what is loaded is rounded, and the next span begins with that; decisions are not rounded.
+  // Loading into single precision rounds, and the next span begins with rounded values; decisions are not rounded.
   std::vector<State> taken = snapshot();
   for (std::size_t b = 0; b < taken.size(); ++b) {
     if (taken[b] == states[b]) continue;
@@ -119,7 +119,7 @@ void FrameRunner::run(Span span, const Observer& observe) {
     for (std::size_t b = 0; b < bodies; ++b) goes_on[b] = present_[b]->frame < setups_[b].frame_count();
     const SpanReport report = run_piece(piece);
     if (!observe) continue;
-    // What is due after a detection within the piece depends on what it removed.
+    // The due stages after a detection within the piece depend on its removals.
     std::array<bool, 6> due = {};
     std::vector<State> states;
     const bool detects = piece.span.contains(Stage::detect) && piece.span.last > Stage::detect;

@@ -17,8 +17,8 @@ namespace {
 
 bool same_sets(const Clusters& a, const Clusters& b) { return a.offsets == b.offsets && a.members == b.members; }
 
-// A span of several stages shows only its end. What an earlier stage left follows from that exactly, as far as no later
-// one may have touched it; of the rest nothing is assumed (the state before stands in for it).
+// A span of several stages shows only its end. Fields that no later stage may change give the state after an earlier
+// stage exactly; the other fields are those of the state before.
 
 State after_detection(State before, const State& end) {
   before.removed = end.removed;
@@ -28,7 +28,7 @@ State after_detection(State before, const State& end) {
   return before;
 }
 
-// Skin makes the skin, compacts numbers and counts up the frame; all else is what it got.
+// Skin makes the skin, compacts numbers and counts up the frame; all other fields are unchanged.
 State before_skin(const State& before, const State& end) {
   State state = end;
   state.frame = before.frame;
@@ -214,8 +214,8 @@ void Judge::see_several(const Moment& moment, const std::array<bool, 6>& seen) {
   if (sees(Stage::detect) && !cuts && !sees(Stage::skin))
     return see_stage(Stage::detect, *before, end, known_rotations);
   if (cuts) {
-    // What each of these did cannot be told apart. Together they must have made what the reference makes of the same
-    // removal, where the rules leave one answer only.
+    // The effects of these stages cannot be told apart. Together they must give the reference's answer to the same
+    // removal, where the rules allow only one.
     const bool unique = promise_of(setup_.merge.rule).unique;
     Verdict verdict;
     verdict.property = "stages in one piece";

@@ -51,7 +51,7 @@ Lockstep::Lockstep(const Setup& setup, const State& start, const State& loaded, 
   }
   tracks_[at(Measure::velocity)].worst.bound = 2 * bound;
 
-  // What the backend has made of what it was given.
+  // The backend's state after loading.
   const Verdict form = oracles::well_formed(setup_, loaded);
   if (!form.holds) {
     oracles::DecisionDifference difference{form.witness};

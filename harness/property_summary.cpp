@@ -10,7 +10,7 @@ namespace cutproof::harness {
 
 namespace {
 
-// What is no number is greater than any.
+// NaN is greater than any number.
 void raise(double& greatest, double value) {
   if (std::isnan(value) || value > greatest) greatest = value;
 }

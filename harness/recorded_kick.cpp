@@ -95,7 +95,7 @@ void read_numbers(const NamedArrays& in, oracles::KickedRuns& runs) {
   }
 }
 
-// What is not asked, because an array is not there.
+// Notes on properties that are not judged, because an array is missing.
 void say_what_is_not_judged(RecordedKick& kick) {
   const std::vector<oracles::KickedRun>& kicks = kick.runs.kicks;
   if (!kicks.front().direction) kick.notes.push_back("Not judged: the answer follows the kick (no directions).");

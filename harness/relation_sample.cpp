@@ -15,8 +15,7 @@ namespace cutproof::harness {
 
 namespace {
 
-// By how much a component is kicked, and a body thrown in a substep [h]: of the size of what tissue does, along no
-// axis.
+// Kick of a component, and displacement of a thrown body in a substep [h]: of the size of tissue motion, along no axis.
 constexpr Vec3 kKick = {0.7, -0.4, 1.3};
 constexpr Vec3 kThrow = {0.3, -0.2, 0.1};
 

@@ -10,7 +10,7 @@ namespace cutproof::harness {
 
 namespace {
 
-// The reader keeps its files open, and what is open lives on without a name.
+// The reader keeps its files open, and open files persist without a name.
 std::unique_ptr<io::RecordingReader> read_and_remove(const std::string& recording) {
   const io::RecordingPaths paths = io::recording_paths(recording);
   const io::Unfinished index(paths.index), particles(paths.particles), skin(paths.skin), blade(paths.blade);
@@ -61,7 +61,7 @@ void RunSession::begin(const Snapshot& loaded) {
   if (wanted_.errors) errors_.emplace(*wanted_.errors, setup, *loaded, make_);
   if (recorder_) recorder_->add(Stage::skin, *loaded);
   if (!against_ || wanted_.page.empty()) return;
-  // What the reference makes of the same, so that the page can show how far that is.
+  // The reference's states, so that the page can show the distance.
   reference_record_ = io::unfinished_name(wanted_.page);
   reference_recorder_.emplace(reference_record_, setup, "", std::string(reference_backend().name));
   // The reference computes in double precision, whatever it was handed.

@@ -33,7 +33,7 @@ Edges edges_of_cells(const oracles::RunCoupling& coupling) {
   return edges;
 }
 
-// What cannot be is left out.
+// Invalid values are left out.
 void put_edges(Body& body, const Edges& edges) {
   const auto n = static_cast<int32_t>(body.rest.size());
   std::vector<std::pair<int32_t, int32_t>> possible;

@@ -48,7 +48,7 @@ void SceneJudge::finish() {
       if (!asked.contains(verdict.property)) judge_.add(std::move(verdict));
     }
   }
-  // `missing`: so much of what should be there is not.
+  // `missing`: number of missing items.
   const auto whole = [&](const char* what, bool holds, double missing, const std::string& text) {
     Verdict verdict;
     verdict.property = what;

@@ -1,5 +1,5 @@
-// The split stage of a simulator: what a cut leaves of a cluster becomes a cluster for each connected piece.
-// It has a fault. docs/tutorial.md finds it.
+// The split stage of a simulator: each connected piece of a cut cluster becomes a cluster. It has a fault.
+// docs/tutorial.md finds it.
 #include <cutproof/plugin.h>
 
 #include <algorithm>

@@ -87,7 +87,7 @@ bool DeviceArray::reserve(int64_t bytes) {
   const auto whole = static_cast<std::size_t>(bytes + 2 * wire::kDeviceCanary);
   if (!works(driver.allocate(&memory, whole), "cuMemAlloc")) return false;
   memory_ = memory;
-  // Canaries first; the array's own bytes 0xff, so that what is not written shows.
+  // Canaries first; the array's own bytes 0xff, so that unwritten bytes show.
   return works(driver.set(memory_, wire::kCanary, whole), "cuMemsetD8") &&
          (bytes == 0 ||
           works(driver.set(memory_ + wire::kDeviceCanary, 0xff, static_cast<std::size_t>(bytes)), "cuMemsetD8"));

@@ -9,16 +9,16 @@ bool open_device(std::string& problem);
 void* device_stream();
 // Until all that was enqueued has ended. False: something failed.
 bool wait_for_device(std::string& problem);
-// What failed last.
+// The last failure.
 const std::string& device_problem();
 
 class DeviceArray {
  public:
   // A copy of `bytes` bytes, with canaries before and behind.
   bool make(const unsigned char* from, int64_t bytes);
-  // Other room, which keeps what fits. What is new is filled with 0xff.
+  // Reallocates and keeps the contents that fit. New bytes are filled with 0xff.
   bool grow(int64_t bytes, int64_t old_bytes);
-  // Copies the contents; `given`: they must be what they were at `to`. What is wrong, or "".
+  // Copies the contents; `given`: they must equal those at `to`. Returns the defect, or "".
   std::string bring_back(unsigned char* to, int64_t bytes, bool given);
   void free();
   void* data() const;

@@ -45,8 +45,8 @@ int64_t up_to_page(int64_t offset) { return (offset + wire::kPage - 1) / wire::k
 // An array of the request in progress.
 struct Held {
   wire::Array wire = {};
-  cutproof_array shown = {};  // what the plugin sees, and may write to
-  cutproof_array right = {};  // what it must still be
+  cutproof_array shown = {};  // the plugin's copy, which it may change
+  cutproof_array right = {};  // the host's values
   int64_t offset = 0;         // of its bytes in memory, on the host
   DeviceArray device;
   int64_t bytes() const { return right.rows * right.columns * size_of(right.type); }
@@ -369,7 +369,7 @@ int ask(void* self) {
   }
 }
 
-// What the plugin must have left as it is.
+// Fields that the plugin must not change.
 void check_descriptions() {
   for (const Held& held : call.arrays) {
     const cutproof_array &shown = held.shown, &right = held.right;

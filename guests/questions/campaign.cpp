@@ -74,7 +74,7 @@ void simplify(Guest& guest, const OperationDescription& operation, const harness
   }
 }
 
-// Whether `one` is worse than what is known: it fails, or comes nearer to its bound.
+// Whether `one` is worse than the worst so far: it fails, or comes nearer to its bound.
 bool is_worse(const Verdict& one, const std::optional<KindSummary::Case>& known) {
   const auto share = [](const Verdict& verdict) {
     if (verdict.bound > 0 && !std::isnan(verdict.measured)) return verdict.measured / verdict.bound;
@@ -85,7 +85,7 @@ bool is_worse(const Verdict& one, const std::optional<KindSummary::Case>& known)
   return share(one) > share(known->verdict);
 }
 
-// What the verdicts on one question add to a campaign.
+// Adds the verdicts on one question to a campaign.
 void count(KernelCampaign& campaign, const harness::Promises& promises, const Question& question, int64_t index,
            bool at_end, const std::vector<Verdict>& verdicts) {
   const OperationDescription& operation = *campaign.operation;
@@ -141,7 +141,7 @@ void count(KernelCampaign& campaign, const harness::Promises& promises, const Qu
   campaign.failed += fails ? 1 : 0;
 }
 
-// A kind of which so many questions were answered, and none was what it says, has not been tested.
+// A kind with this many answered questions, none of which matches the kind, has not been tested.
 constexpr int64_t kEnoughToBeOne = 10;
 
 }  // namespace
@@ -172,7 +172,7 @@ harness::Promises promises_of(const PluginInfo& plugin, const OperationDescripti
   const std::string words = plugin.promises.value_or(std::string(operation.by_itself));
   promises.words = harness::parse_promises(words, library, "promises");
   if (!operation.is_simulator()) return promises;
-  // Of a run the judge asks what is promised; this is left.
+  // The judge of runs checks promises of runs; these remain.
   promises.words = harness::Promises{}.words;
   if ((scenes::scene_promises(words) >> static_cast<int>(oracles::RunPromise::deterministic) & 1u) == 0) {
     promises.words &= ~harness::parse_promises("same_bits", library, "promises");
@@ -242,11 +242,11 @@ std::vector<Verdict> judge_answer(Guest& guest, const OperationDescription& oper
       same.witness = {};
     }
     verdicts.push_back(same);
-    if (same.holds) judge_beside();  // of who promises to repeat itself and does not, nothing more is known
+    if (same.holds) judge_beside();  // a broken promise of determinism ends the judgement
   } else if (!answered) {
     verdicts.front() = of_all_cases(kAnswersProperty, "asked again: " + second.text);
   } else if (!is_same) {
-    // Another answer, which may be as right as the first, or what a race leaves now and then.
+    // Another answer, which may be as correct as the first, or the occasional result of a race.
     for (Verdict& verdict : operation.judge(question, second.arrays, precision)) {
       if (verdict.holds) continue;
       verdict.witness.text = "asked again: " + verdict.witness.text;
@@ -268,7 +268,7 @@ KernelCampaign judge_kernel(Guest& guest, const OperationDescription& operation,
   const Clock::time_point begin = Clock::now();
   KernelCampaign campaign;
   campaign.operation = &operation;
-  // What goes without saying says nothing of bits.
+  // The defaults do not promise equal bits.
   const bool again = guest.plugin().promises && promises.cover("determinism");
   const auto kinds = static_cast<int64_t>(operation.kinds().size());
   const Precision precision = guest.plugin().precision;
@@ -291,7 +291,7 @@ KernelCampaign judge_kernel(Guest& guest, const OperationDescription& operation,
   const auto ask_large_ones = [&] {
     if (operation.draw_large == nullptr) return;
     const std::vector<std::string> large = operation.large_kinds();
-    std::vector<NotAsked> last(large.size());  // what was asked last of each kind
+    std::vector<NotAsked> last(large.size());  // the last question of each kind
     for (const int64_t size : options.sizes) {
       for (std::size_t kind = 0; kind < large.size() && goes_on(); ++kind) {
         NotAsked& before = last[kind];

@@ -27,7 +27,7 @@ struct KernelCampaignOptions {
                            // the time of an answer grow with the square of the size
   std::optional<double> seconds = {};  // begins no further question after so long
   double simplify = 20;                // [s] for each failure that is kept
-  // After so many questions that were not answered at all the campaign ends; 0: never.
+  // The campaign ends after this number of unanswered questions; 0: never.
   int64_t most_lost = 10;
   StopAsked stop_asked = {};  // asks no further question, and shrinks no further
 };
@@ -41,7 +41,7 @@ struct KernelFailure {
   Verdict of_simplest;
 };
 
-// What became of the questions of one kind.
+// Results of the questions of one kind.
 struct KindSummary {
   // A promised verdict on one of them.
   struct Case {
@@ -51,7 +51,7 @@ struct KindSummary {
   std::string kind;
   int64_t questions = 0, cases = 0, refused = 0;
   int64_t failed = 0;    // cases
-  int64_t as_drawn = 0;  // questions that were what the kind says (OperationDescription::as_drawn)
+  int64_t as_drawn = 0;  // questions that match their kind (OperationDescription::as_drawn)
   // The one that fails, else the one that comes nearest to its bound. Nothing where no bound but 0 was met.
   std::optional<Case> worst, first_failure;
 };
@@ -73,7 +73,7 @@ struct KernelCampaign {
   const OperationDescription* operation = nullptr;
   int64_t questions = 0, cases = 0, refused = 0, lost = 0;
   bool gave_up = false;
-  bool ended = false;    // the guest has, and cannot be started anew
+  bool ended = false;    // the guest has ended, and cannot be restarted
   bool stopped = false;  // it was asked to stop, and did before its end
   double seconds = 0;
   harness::PropertySummaries properties;  // judged and failed: cases
@@ -92,8 +92,8 @@ struct KernelCampaign {
 // "question 5 (a wire)"; large ones by their size.
 std::string name_of_question(int64_t index, int64_t size, const std::string& kind);
 
-// What a plugin promises of an operation: what it says, or what goes without saying. Throws InputError, naming the
-// library, for words that there are not.
+// A plugin's promises of an operation: the stated ones, or the defaults. Throws InputError, naming the library, for
+// unknown words.
 harness::Promises promises_of(const PluginInfo& plugin, const OperationDescription& operation,
                               const std::string& library);
 
@@ -117,7 +117,7 @@ struct SavedQuestion {
   Question question;  // of a large one kind and size alone
   Precision precision = Precision::binary32;
   bool at_end = true;
-  std::string plugin, found;  // who failed, and how
+  std::string plugin, found;  // failures
   uint64_t seed = 0;
   int64_t index = 0;
 };

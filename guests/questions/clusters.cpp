@@ -14,7 +14,7 @@ Question draw_clusters(uint64_t seed, int64_t index, Precision) {
   Random random(mixed(seed, index));
   const auto kinds = static_cast<int64_t>(graph_kinds().size());
   Tissue tissue = draw_graph(random, index % kinds);
-  tissue = part_of(tissue, tissue.alive);  // what is dead is in no cluster, and no part of the question
+  tissue = part_of(tissue, tissue.alive);  // dead particles are in no cluster, and not in the question
   return {graph_kinds()[at(index % kinds)], arrays_of(tissue), {}};
 }
 
@@ -48,7 +48,7 @@ std::vector<Verdict> judge_clusters(const Question& question, const Arrays& answ
   clusters.degenerate.resize(count);
   clusters.rest_center.resize(count);
   clusters.mass.resize(count, 1);
-  state.edge_covered = true;  // asked only of who promises it
+  state.edge_covered = true;  // judged only if promised
   std::vector<Verdict> verdicts;
   for (const auto& oracle : {oracles::well_formed, oracles::cluster_connectivity, oracles::coverage,
                              oracles::component_match, oracles::isolation, oracles::edge_cover}) {

@@ -54,7 +54,7 @@ std::vector<Verdict> judge_components(const Question& question, const Arrays& an
   verdict.property = "components";
   verdict.bound_source = kSource;
   verdict.unit = "1";
-  // By the first of each component, whose label is the component's: the first of all components that have it.
+  // By the first particle of each component, whose label is the component's: the first component with this label.
   std::vector<int32_t> firsts;
   for (int32_t i = 0; i < static_cast<int32_t>(label.size()); ++i) {
     if (search.first[at(i)] == i) firsts.push_back(i);

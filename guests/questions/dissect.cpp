@@ -37,7 +37,7 @@ class Greatest {
   }
   void see(double measured, int64_t particle, int64_t frame, const char* text) {
     ++verdict_.checked;
-    // Nothing is worse than what is no number.
+    // NaN is the worst value.
     if (!std::isnan(verdict_.measured) && !(measured <= verdict_.measured)) verdict_.measured = measured;
     if (measured <= verdict_.bound || !verdict_.holds) return;
     verdict_.holds = false;

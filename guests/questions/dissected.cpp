@@ -213,7 +213,7 @@ std::vector<State> moments(const property_tests::Instance& instance, Stage stage
 }  // namespace
 
 Dissected draw_dissection(Random& random, Stage stage, property_tests::ClusterKind clusters) {
-  constexpr int kTrials = 10'000;  // about one in five has what is looked for
+  constexpr int kTrials = 10'000;  // about one in five has the wanted kind
   for (int trial = 0; trial < kTrials; ++trial) {
     const int size = random.between(4, 30);
     const auto seed =

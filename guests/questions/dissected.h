@@ -1,4 +1,4 @@
-// What the questions about split and merge share: a body with its clusters in the middle of a frame. Internal to
+// Shared code of the questions about split and merge: a body with its clusters in the middle of a frame. Internal to
 // guests/.
 #pragma once
 #include <string>
@@ -22,11 +22,11 @@ struct Dissected {
 
 // Those of the tissue, and `offsets`, `members`, `number`; the limits are added by who asks.
 Arrays arrays_of(const Dissected& dissected);
-// What is wrong with them, or "": sizes, indices, and clusters that were not connected before the last cut.
+// Their defect, or "": sizes, indices, and clusters that were not connected before the last cut.
 std::string problem_of_dissected(const Question& question);
 
-// The state before the stage, and a setup in which that stage is due. Each cluster's rotation says whose it is: its
-// number is the first entry, if `rotations_are_told`, else all are equal.
+// The state before the stage, and a setup in which that stage is due. Each cluster's rotation identifies the cluster:
+// its number is the first entry, if `rotations_are_told`, else all are equal.
 struct BeforeStage {
   Setup setup;
   State state;
@@ -39,7 +39,7 @@ State with_clusters(State state, const Array& offsets, const Array& members, con
 // Of a state: `offsets`, `members`, `number`.
 Arrays clusters_of(const State& state);
 
-// Clusters of what lives: all within some steps from a centre, until everything is covered.
+// Clusters of living particles: all within some steps from a centre, until every particle is covered.
 std::vector<std::vector<int32_t>> balls(const Tissue& tissue, int32_t most_steps, Random& random);
 // Clusters of a grid along x, each so many nodes wide, which begin every `step` nodes; of all particles.
 std::vector<std::vector<int32_t>> slabs(const Tissue& tissue, int32_t width, int32_t step);

@@ -114,7 +114,7 @@ Scene draw_body(Random& random, const Limits& limits) {
   return scene;
 }
 
-// How it moves at the start and what pulls it. A velocity that all have in common is returned.
+// Initial motion and gravity. Returns a common velocity of all particles.
 Vec3 draw_motion(Random& random, const Limits& limits, Scene& scene) {
   const auto number = [&](double most) { return most * (2 * random.unit() - 1); };
   const auto vector = [&](double most) {
@@ -257,7 +257,7 @@ void add_strokes(Scene& scene, Vec3 common, const std::vector<SceneStroke>& stro
 
 constexpr const char *kAlongTheGrid = "along the grid", *kBesideTheTissue = "beside the tissue";
 
-// What the judge of runs found of the tissue, beside what the blade was to do.
+// Tissue according to the judge of runs, compared with the intended cut.
 struct SceneKind {
   const char* name;
   std::vector<SceneStroke> (*draw)(Random& random, const Scene& scene, const Limits& limits);

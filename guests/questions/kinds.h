@@ -1,4 +1,4 @@
-// What the operations share. Internal to guests/questions/.
+// Shared code of the operations. Internal to guests/questions/.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -54,7 +54,7 @@ Tissue part_of(const Tissue& tissue, const std::vector<uint8_t>& keep);
 // The arrays of cutproof_tissue, and `alive`.
 Arrays arrays_of(const Tissue& tissue);
 Tissue tissue_of(const Arrays& arrays);
-// What is wrong with them, or "".
+// Their defect, or "".
 std::string problem_of_body(const Question& question);
 // The same question with fewer particles, the most drastic first; all of them living, too.
 std::vector<Question> fewer_particles(const Question& question);
@@ -73,7 +73,7 @@ Tissue draw_large_graph(Random& random, int64_t kind, int32_t n);
 // Of large questions, which no ordinary one begins with.
 uint64_t large_seed(uint64_t seed, int64_t kind);
 
-// What a surface around the living particles of a grid has: outer shells and inner ones.
+// Shells of a surface around the living particles of a grid: outer and inner ones.
 std::array<int64_t, 2> shells_around(const Tissue& tissue);
 
 }  // namespace cutproof::guests

@@ -135,7 +135,7 @@ constexpr MergeKind kMergeKinds[] = {
        d.cap = r.between(2, 12);
        return d;
      }},
-    {"small pieces apart",  // what nothing touches stays small
+    {"small pieces apart",  // isolated clusters stay small
      [](Random& r) {
        Dissected d;
        std::vector<std::array<int32_t, 3>> nodes;
@@ -206,7 +206,7 @@ std::string problem_of_merge(const Question& question) {
 }
 
 std::vector<Verdict> judge_merge(const Question& question, const Arrays& answers, Precision) {
-  // A cluster's number says whose rotation it keeps, so that it does is not asked.
+  // A cluster's number tells the origin of its rotation, so the rotation itself is not judged.
   const BeforeStage before = before_stage(question, false);
   const State after = with_clusters(before.state, answers[0], answers[1], answers[2]);
   std::vector<Verdict> verdicts = {oracles::well_formed(before.setup, after)};

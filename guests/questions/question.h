@@ -1,5 +1,5 @@
-// What is asked of a single kernel, and when its answer is right. Plugins, Python functions and files of test vectors
-// are asked the same questions and judged alike.
+// Questions to a single kernel, and the judge of its answers. Plugins, Python functions and files of test vectors get
+// the same questions and the same judge.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -21,22 +21,22 @@ namespace cutproof::guests {
 // values have it.
 struct Question {
   std::string kind;  // which of the operation's kinds of cases, in words
-  Arrays given;      // what the kernel gets, by the names of cutproof/plugin.h
-  Arrays known;      // what the judge alone needs
+  Arrays given;      // input of the kernel, by the names of cutproof/plugin.h
+  Arrays known;      // data for the judge alone
   int64_t size = 0;  // of a large one, which its seed, kind and size make again; else 0
 
   friend bool operator==(const Question&, const Question&) = default;
 };
 
-// What a kernel answers.
+// The answer of a kernel.
 struct AnswerArray {
   std::string_view name;
   bool real = false;  // of the kernel's precision; else of `type`
   ElementType type = ElementType::i32;
   int64_t columns = 1;
   std::string_view rows_of = {};  // as many rows as this array that is given has; empty: the kernel says how many
-  std::string_view text;          // what it is, for a person
-  bool optional = false;          // only in files: what it shows is not judged without it
+  std::string_view text;          // explanation, for a person
+  bool optional = false;          // only in files: properties that need it are not judged without it
 };
 
 // Asks another question of the same guest; nothing if it does not answer.
@@ -45,10 +45,10 @@ using AskBeside = std::function<std::optional<Arrays>(const Question&)>;
 struct OperationDescription {
   wire::Operation number;  // the plugin's member that answers it: of a stage `run`, by way of states
   std::string_view name;
-  std::string_view text;       // what it does, for a person
+  std::string_view text;       // explanation, for a person
   std::string_view by_itself;  // promises (harness/promises.h) that go without saying
   std::span<const AnswerArray> answers;
-  // Cases are counted by what one question holds of them: matrices, or bodies.
+  // Unit in which cases are counted: matrices, or bodies.
   std::string_view cases;
   // Witness::particles of a failing verdict names all cases of the question that are wrong. Else a question is one
   // case.
@@ -59,7 +59,7 @@ struct OperationDescription {
   std::string (*size_of)(const Question& question);  // "4 particles", for a person
   // One verdict for each property of the operation, promised or not; `answers` in the order above, in any precision.
   std::vector<Verdict> (*judge)(const Question& question, const Arrays& answers, Precision precision);
-  // What is wrong with a question that was read from a file, or "": sizes and indices. Types are right already.
+  // The defect of a question from a file, or "": sizes and indices. Types are checked already.
   std::string (*problem)(const Question& question);
   // Questions that are each simpler, the most drastic first. Null for those that are asked of files alone.
   std::vector<Question> (*simpler)(const Question& question);
@@ -73,11 +73,11 @@ struct OperationDescription {
   // Of a whole simulator, whose promises are those of runs. Null for all others.
   // `draw` within what a plugin states; throws InputError for words of its that there are not.
   Question (*draw_for)(uint64_t seed, int64_t index, const PluginInfo& plugin) = nullptr;
-  // The property of which a verdict has looked at something where a question was what its kind says.
+  // The property whose verdict is not vacuous if a question matches its kind.
   std::string_view as_drawn = {};
   // Where two answers to a question part first.
   std::string (*difference)(const Question& question, const Arrays& one, const Arrays& other) = nullptr;
-  // Verdicts on what is asked beside a question that was answered.
+  // Verdicts on further questions beside an answered one.
   std::vector<Verdict> (*judge_beside)(const Question& question, const Arrays& answers, Precision precision,
                                        const AskBeside& ask) = nullptr;
   // An answer as files of a run (docs/reference/run.md); nothing if it is none.
@@ -92,7 +92,7 @@ std::span<const OperationDescription> operations();
 // Null if there is none of that name.
 const OperationDescription* find_operation(std::string_view name);
 
-// A failing verdict where nothing can be judged: what the answer is not.
+// A failing verdict for an answer that cannot be judged.
 Verdict unreadable(std::string_view property, const std::string& why);
 
 }  // namespace cutproof::guests

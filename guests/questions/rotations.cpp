@@ -53,7 +53,7 @@ Question draw_rotations(uint64_t seed, int64_t index, Precision precision) {
       const Mat3 start = frame.previous.empty() ? before[i] : frame.previous[i];
       append(a, frame.a[i]);
       append(previous, start);
-      // What is related to another answer has a best rotation of its own.
+      // A matrix related to another answer has its own best rotation.
       const bool best = frame.expected == fixtures::Expected::best || frame.expected == fixtures::Expected::related;
       expected.push_back(best ? 0 : frame.expected == fixtures::Expected::nearest ? 1 : 2);
       before[i] = rounded(reference::closest_rotation(frame.a[i], start).r, precision);
@@ -105,7 +105,7 @@ Mat3 inverse_of(const Mat3& m) {
   return inverse;
 }
 
-// One matrix, what was answered to it, and the best rotation as far as one is known.
+// One matrix, its answer, and the best rotation as far as known.
 struct Answered {
   Mat3 a, previous, r;
   std::optional<Mat3> best;
@@ -178,7 +178,7 @@ Off off_by(const Mat3& a, const Mat3& previous, const Mat3& r, uint8_t expected,
   return off;
 }
 
-// What was found of one property, and the worst of it.
+// Results of one property, and its worst answer.
 struct Finding {
   Finding(std::string_view property, std::string_view source, double bound) {
     verdict.property = property;
@@ -208,7 +208,7 @@ std::vector<Verdict> judge_rotations(const Question& question, const Arrays& ans
   const char* const source = "method.md, Hard cases";
   Finding rotation("rotation", source, bounds.orthogonality), best("best rotation", source, bounds.gap),
       nearest("nearest rotation", source, bounds.deviation), kept("previous rotation kept", source, 0);
-  // What repeats in a large question is judged once: bytes of all that the judgement depends on.
+  // Repeated parts of a large question are judged once: bytes of all inputs of the judgement.
   std::unordered_map<std::string, Off> known;
   for (int64_t row = 0; row < a.rows(); ++row) {
     const std::array<Mat3, 3> numbers = {matrix(a, row), matrix(previous, row), matrix(r, row)};

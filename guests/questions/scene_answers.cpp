@@ -13,7 +13,7 @@ namespace cutproof::guests::scenes {
 
 namespace {
 
-// How many there are in each frame, of something that comes to `total`; -1: as before. "" or what is wrong.
+// How many there are in each frame, of something that comes to `total`; -1: as before. "" or the defect.
 std::string problem_of_counts(const Array& counts, int64_t frames, int64_t least, int64_t total,
                               std::string_view what) {
   if (counts.rows() != frames) {

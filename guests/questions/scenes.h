@@ -1,4 +1,4 @@
-// Scenes for whole simulators: a body, and what blades do to it. The question of `dissect`, and its answer as a run
+// Scenes for whole simulators: a body and blades. The question of `dissect`, and its answer as a run
 // (docs/reference/plugins.md, Whole simulators).
 #pragma once
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace cutproof::guests::scenes {
 
-// What a plugin takes.
+// Limits of a plugin.
 struct Limits {
   double particles = 60;
   double gap = 1;                                                // [h] between cuts side by side
@@ -23,7 +23,7 @@ struct Limits {
 // Of its words. Throws InputError for one that there is not.
 Limits limits_of(const std::string& words, const std::string& plugin);
 
-// What a plugin promises of its runs, and of what is asked beside one. Their bits are in a question.
+// A plugin's promises of its runs and of related runs. Their bits are in a question.
 enum : uint32_t {
   kPromisesNoGhostForce = 1u << oracles::kRunPromises.size(),
   kPromisesMirror = kPromisesNoGhostForce << 1
@@ -63,8 +63,7 @@ struct Range {
 };
 Range range_along(const Scene& scene, Vec3 direction);
 Vec3 axis_vector(int axis);
-// Whether tetrahedra that share a corner are all joined by faces: what holds together by a node or an edge is no
-// tissue.
+// Whether tetrahedra that share a corner are all joined by faces: a node or an edge alone joins no tissue.
 bool is_joined_by_faces(const std::vector<int32_t>& tetrahedra);
 
 std::vector<std::string> scene_kinds();
@@ -104,7 +103,7 @@ struct RunFiles {
 RunFiles run_files(const Question& question, const Arrays& answers, Precision precision);
 std::vector<io::ArrayFile> files_of(const Question& question, const Arrays& answers, Precision precision);
 
-// What is promised of other runs beside this one: with one piece kicked, and mirrored.
+// Promises of related runs: with one piece kicked, and mirrored.
 std::vector<Verdict> judge_runs_beside(const Question& question, const Arrays& answers, Precision precision,
                                        const AskBeside& ask);
 

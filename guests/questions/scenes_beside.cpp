@@ -94,7 +94,7 @@ Scene kicked_scene(const Scene& scene, const Apart& apart) {
       inside / std::max(1.0, static_cast<double>(scene.count()) - others) - outside / std::max(1.0, others);
   const Vec3 direction = norm(away) > 0 ? normalized(away) : Vec3{1, 0, 0};
   for (const int32_t i : smallest->second) kicked.kick[at(i)] = direction * (0.1 * scene.h / scene.frame_time);
-  // Once no blade is there: what else it cuts depends on where the pieces are.
+  // After the last cut: further cuts depend on the places of pieces.
   for (std::size_t k = 0; k < scene.blade.size(); ++k) {
     if (std::isfinite(scene.blade[k].x)) kicked.kick_frame = static_cast<int64_t>(k) / (4 * scene.blades) + 1;
   }
@@ -128,7 +128,7 @@ std::vector<Verdict> judge_kicked(const Question& question, const std::vector<io
   for (std::size_t i = 0; i < kicked.kick.size(); ++i) {
     if (kicked.kick[i] != Vec3{}) runs.kicks.front().piece = apart.piece[i];
   }
-  // Who is not surely in a piece is not looked at.
+  // Particles that are not certainly in a piece are ignored.
   for (const io::ArrayFile& frame : run) {
     const Array* const alive = find_array(frame.arrays, "alive");
     const std::size_t there = vectors_of(*find_array(frame.arrays, "positions")).size();

@@ -1,4 +1,4 @@
-// Split: what cutting leaves of each cluster, judged by the oracles of the stage. Plugins are asked it as a stage, of
+// Split: the rest of each cluster after a cut, judged by the oracles of the stage. Plugins get it as a stage, with
 // whole states; files of test vectors as this question.
 #include <fmt/format.h>
 

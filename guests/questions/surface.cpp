@@ -47,7 +47,7 @@ void fail(Verdict& verdict, std::vector<int32_t> particles, std::string text) {
   verdict.witness = {{}, std::move(particles), {}, std::move(text)};
 }
 
-// Groups of what is joined.
+// Groups of joined items.
 class Groups {
  public:
   explicit Groups(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0); }
@@ -61,7 +61,7 @@ class Groups {
   std::vector<std::size_t> parent_;
 };
 
-// The grid with who lives where, and both ways of joining what meets across the diagonal of a face.
+// The grid with its living nodes, and both ways of joining nodes across the diagonal of a face.
 struct Occupancy {
   explicit Occupancy(const Tissue& tissue) : grid(tissue.body.grid), living(at(grid.node_count()), 0) {
     for (std::size_t i = 0; i < tissue.alive.size(); ++i) living[at(tissue.body.node[i])] = tissue.alive[i];
@@ -96,7 +96,7 @@ struct Occupancy {
   std::vector<uint8_t> living;  // [node]
 };
 
-// What a polarity makes of a body: components, and cavities in them.
+// Components and cavities of a body under a polarity.
 struct Topology {
   Topology(const Occupancy& nodes, bool tissue_across_faces)
       : component(nodes.groups(true, tissue_across_faces)), empty(nodes.groups(false, !tissue_across_faces)) {
@@ -124,8 +124,8 @@ double place_tolerance(Vec3 q, Precision precision) {
   return 8 * unit_roundoff(precision) * std::max({std::abs(q.x), std::abs(q.y), std::abs(q.z), 1.0});
 }
 
-// What every surface around the tissue has, wherever its method puts vertices: each lies in a cell that has living
-// corners and empty ones (its boundary included, within rounding).
+// A requirement on every surface around the tissue, for any method: each vertex lies in a cell that has living corners
+// and empty ones (its boundary included, within rounding).
 void check_places(const Surface& surface, const Occupancy& nodes, Precision precision, Verdict& verdict) {
   for (std::size_t v = 0; v < surface.vertices.size(); ++v) {
     ++verdict.checked;
@@ -169,7 +169,7 @@ void check_places(const Surface& surface, const Occupancy& nodes, Precision prec
   }
 }
 
-// What marching cubes has besides: one vertex on each grid edge that leaves the tissue.
+// A further requirement on marching cubes: one vertex on each grid edge that leaves the tissue.
 void check_vertices(const Surface& surface, const Occupancy& nodes, Precision precision, Verdict& verdict) {
   std::vector<int32_t> vertex_on(3 * nodes.living.size(), -1);  // by edge: 3 · lower node + axis
   for (std::size_t v = 0; v < surface.vertices.size(); ++v) {
@@ -303,7 +303,7 @@ struct Crossing {
   int64_t line;      // the line's node with x = 0
   double x, within;  // [h] where, and how far rounding may carry it
   int32_t shell;
-  int32_t turn;  // 1: the surface goes around what lies behind it; -1: around what lies before it
+  int32_t turn;  // 1: the surface encloses the space behind it; -1: the space before it
 };
 
 // Of an edge, where it crosses the plane y = j: the same for both of its triangles, whose sum over a closed surface is

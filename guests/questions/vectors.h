@@ -37,18 +37,18 @@ Vectors draw_vectors(const OperationDescription& operation, uint64_t seed, int64
 // Default number of drawn cases.
 int64_t usual_vector_cases(const OperationDescription& operation);
 
-// The whole file: questions, answers where they are unique, and what makes others acceptable.
+// The whole file: questions, answers where they are unique, and criteria for other answers.
 io::ArrayFile file_of(const Vectors& vectors);
-// Throws InputError, naming `file` and the array, for anything else: what is unknown, missing, of another shape or
-// type, or does not follow from the questions.
+// Throws InputError, naming `file` and the array, for an array that is unknown, missing, of another shape or type, or
+// that does not follow from the questions.
 Vectors vectors_of(const io::ArrayFile& contents, const std::string& file);
 
-// What a file of answers holds: those of each case, in the order of the operation's answers. An optional one that is
+// Contents of a file of answers: those of each case, in the order of the operation's answers. An optional one that is
 // not there has no name.
 using AllAnswers = std::vector<Arrays>;
 // Throws InputError, naming `file`, the array, and the first case without an answer.
 AllAnswers answers_of(const io::ArrayFile& contents, const std::string& file, const Vectors& vectors);
-// The reverse, for those who answer in C++.
+// The reverse, for answers from C++.
 io::ArrayFile file_of_answers(const Vectors& vectors, const AllAnswers& answers);
 
 struct VectorFailure {
@@ -73,7 +73,7 @@ struct VectorReport {
   bool holds() const { return failed == 0 && verdicts > 0; }
 };
 
-// What goes without saying, or what `words` promise. Throws InputError for words that there are not.
+// The default promises, or those of `words`. Throws InputError for unknown words.
 harness::Promises promises_of(const OperationDescription& operation, const std::optional<std::string>& words);
 // The verdicts of `cutproof judge` on the same answers.
 VectorReport judge_vectors(const Vectors& vectors, const AllAnswers& answers, const harness::Promises& promises);

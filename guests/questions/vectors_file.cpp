@@ -146,7 +146,7 @@ void add_bodies(const Vectors& vectors, io::ArrayFile& file) {
   }
 }
 
-// Of each case `offsets`, `members` and what has an entry for each cluster, behind those of the case before.
+// Appends each case's `offsets`, `members` and arrays with an entry for each cluster.
 void add_clusters(const std::vector<Arrays>& cases, const std::vector<std::string>& of_cluster,
                   const std::string& prefix, io::ArrayFile& file) {
   Column<int64_t> cluster_offsets{prefix + "cluster_offsets", {}, {0}}, offsets{prefix + "offsets", {}, {0}};
@@ -272,7 +272,7 @@ void add_surface(const Vectors& vectors, io::ArrayFile& file) {
   }
 }
 
-// What the reference makes of the clusters.
+// The reference's answer to the clusters.
 void add_stage(const Vectors& vectors, io::ArrayFile& file) {
   const bool splits = limits_of(*vectors.operation).size() == 1;
   std::vector<Arrays> answers;
@@ -377,7 +377,7 @@ class Reader {
   Reader(const NamedArrays& arrays, const std::vector<std::string>* kinds, const std::vector<int32_t>* kind)
       : arrays_(arrays), kinds_(kinds), kind_(kind) {}
 
-  // One entry more than cases; from 0 to `end`. What begins in case k ends where the next one begins.
+  // One entry more than cases; from 0 to `end`. Case k ends where the next one begins.
   std::vector<int64_t> offsets(const std::string& name, int64_t cases, int64_t end, const char* what) const {
     const std::vector<int64_t> values = arrays_.long_integers(arrays_.require(name, {-1}));
     const auto there = static_cast<int64_t>(values.size()) - 1;
@@ -458,7 +458,7 @@ std::vector<uint8_t> bytes_of(const NamedArrays& arrays, const Array& array) {
   return values;
 }
 
-// `offsets`, `members` and others of each case, as the judges take them. What lies within a case is theirs to judge.
+// `offsets`, `members` and others of each case, as the judges take them. The judges check values within a case.
 class ClusterReader {
  public:
   ClusterReader(const Reader& reader, int64_t cases, const std::vector<std::string>& of_cluster) {
@@ -652,7 +652,7 @@ Vectors vectors_of(const io::ArrayFile& contents, const std::string& file) {
   if (vectors.operation == nullptr) {
     throw refuse("schema", fmt::format("It says '{}', which this program does not read.", *schema));
   }
-  // What a file of no cases has, every one has.
+  // Arrays of a file without cases are in every file.
   const io::ArrayFile model = file_of(vectors);
   std::vector<KnownArray> known, known_texts;
   for (const Array& array : model.arrays) known.push_back({array.name, ""});
@@ -736,7 +736,7 @@ std::vector<KnownArray> known_answers(const OperationDescription& operation) {
   return known;
 }
 
-// Real answers must not be coarser than what is asked for.
+// Real answers must not be coarser than the requested precision.
 void require_precision(const Array& array, const Vectors& vectors, const NamedArrays& arrays) {
   if (!harness::is_real(array)) {
     arrays.refuse(array.name,
