@@ -295,7 +295,7 @@ class PluginBackend final : public Backend {
     if (precision() != Precision::binary64) state.place_rounding = rounding_of_coordinates(body, state);
   }
 
-  // A process that was started anew knows no body.
+  // A restarted process has no body.
   void reload() {
     for (std::size_t b = 0; b < setups_.size(); ++b) load_body(b);
     restarts_ = guest_.restarts();

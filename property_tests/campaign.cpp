@@ -34,7 +34,7 @@ Judgement thrown(const std::string& backend, const std::string& what) {
   return judgement;
 }
 
-// What `run` throws, in words; empty: nothing. What the machine throws goes on.
+// The exception of `run`, in words; empty: none. Exceptions of the machine pass through.
 std::string problem_of(const std::function<void()>& run) {
   try {
     run();
@@ -50,7 +50,7 @@ std::string problem_of(const std::function<void()>& run) {
   }
 }
 
-// One load of cases, on its way through the threads.
+// One batch of cases, on its way through the threads.
 struct Load {
   int64_t number = 0;
   std::vector<int64_t> indices;
@@ -61,7 +61,7 @@ struct Load {
   int device = 0;
   std::vector<CaseRun> runs;
   std::string backend;      // its name
-  std::string problem;      // what it threw; empty: nothing
+  std::string problem;      // its exception; empty: none
   bool is_refused = false;  // which of the bodies shows where each is alone
 
   std::size_t claimed = 0, judged = 0;  // cases: to be judged by some thread; judged
@@ -133,14 +133,14 @@ class Runner {
     return options_.shard + next_ * options_.batch * options_.shards < options_.cases && next_ <= last_wanted_ &&
            !time_is_over() && !is_stopped();
   }
-  // Once it is asked to stop, what is begun counts as far as it was judged.
+  // After a stop is asked, batches in progress count as far as they were judged.
   bool is_stopped() {
     if (is_asked(options_.stop_asked)) stopped_ = true;
     return stopped_;
   }
-  // When its time is over, some cases of what is begun are judged all the same if none was.
+  // When its time is over without a judged case, some cases of batches in progress are still judged.
   bool is_over() { return is_stopped() || (time_is_over() && has_judged_); }
-  // Loads are begun in order, so the first violation is found whatever comes after it.
+  // Batches begin in order, so the first violation is found.
   bool is_wanted(const LoadPointer& load) const { return load->number <= last_wanted_; }
   void drop_what_nobody_wants() {
     const bool is_all = is_over();
@@ -188,7 +188,7 @@ class Runner {
       load->is_refused = true;
     }
     const double running = seconds_since(begin);
-    if (!load->problem.empty()) place.backend.reset();  // what threw is not used again
+    if (!load->problem.empty()) place.backend.reset();  // a backend that threw is not used again
     lock.lock();
     campaign_.running += running;
     --running_;
@@ -204,11 +204,11 @@ class Runner {
     }
     Judgement judgement =
         judge_case(c, load.loaded[k], load.runs[k], load.backend, load.indices[k] % options_.thorough == 0);
-    load.runs[k] = {};  // states are the most of what a campaign holds
+    load.runs[k] = {};  // states take most of a campaign's memory
     return judgement;
   }
 
-  // Some cases of the load that has waited longest.
+  // Some cases of the batch that has waited longest.
   void judge(Lock& lock) {
     const LoadPointer load = waiting_.front();
     const std::size_t first = load->claimed, cases = load->cases.size();
@@ -266,7 +266,7 @@ class Runner {
     std::move(part.violations.begin(), part.violations.end(), std::back_inserter(campaign_.violations));
   }
 
-  // Enough that threads seldom wait for each other, few enough that all of them have the last load to judge.
+  // Enough that threads seldom wait for each other, few enough that all threads share the last batch.
   static constexpr std::size_t kMostJudgedAtOnce = 16;
 
   const CampaignOptions& options_;

@@ -28,21 +28,21 @@ constexpr int kFormatVersion = 4;
 // Classes of cases are rare: below this many cases, or with small ones only, an empty class says nothing.
 constexpr int64_t kCasesThatMeetEveryClass = 1000;
 constexpr int kSizeThatMeetsEveryClass = 79;
-// Of what is compared of iterates, as much as may stay undecided (tolerances.md, Iterate by iterate). A judge that
-// grants everything judges nothing. (Merges of whole frames cannot be decided at all; they are counted.)
+// Greatest share of undecided comparisons of iterates (tolerances.md, Iterate by iterate). A judge that grants
+// everything judges nothing. (Merges of whole frames cannot be decided at all; they are counted.)
 constexpr double kMostUndecided = 0.001;
 
 constexpr double kMostCounted = 1e12;  // by one shard, of anything
 
-// What a result counts and measures, and what is added up of shards.
+// Counts and measurements of a result, and those that are summed over shards.
 constexpr const char* kCounts[] = {"cases", "refused", "verdicts", "particles"};
 constexpr const char* kCountsOfSteps[] = {"steps", "particles", "undecidable"};  // within steps_compared
 constexpr const char* kOfThreads[] = {"generating", "running", "judging"};       // within thread_seconds
 
 constexpr const char* kRemedy = "give the results (--json) of all shards of one campaign, each once";
 
-// What makes two results shards of one campaign: what decides which cases there are, what runs them, and what judges.
-// Threads are the machine's business: no case depends on them.
+// Fields that two shards of one campaign share: those that determine cases, backend and judge. No case depends on the
+// number of threads.
 constexpr const char* kOfTheCampaign[] = {"cutproof",    "commit",        "backend",  "schedule", "schedule_seed",
                                           "seed",        "sizes",         "dynamics", "batch",    "keep_going",
                                           "cases_asked", "seconds_asked", "shards"};
@@ -106,13 +106,13 @@ void add_shard(json& whole, const json& part) {
   for (const char* each : kOfThreads)
     add_figure(whole.at("thread_seconds").at(each), part.at("thread_seconds").at(each));
   whole["mean_particles"] = mean(whole.at("particles").get<int64_t>(), whole.at("cases").get<int64_t>());
-  // Shards run beside each other: together they take as long as the slowest, and do what all of them do.
+  // Shards run concurrently: together they take as long as the slowest, and do the work of all.
   whole["seconds"] = std::max(whole.at("seconds").get<double>(), part.at("seconds").get<double>());
   if (whole.contains("steps_compared")) {
     json& compared = whole.at("steps_compared");
     const json& more = part.at("steps_compared");
     for (const char* count : kCountsOfSteps) add_count(compared.at(count), more.at(count));
-    // A number, or of what failed the string "inf".
+    // A number, or the string "inf" for a failure.
     const json &here = compared.at("greatest_h"), &there = more.at("greatest_h");
     if (there.is_string() || (here.is_number() && there.get<double>() > here.get<double>())) {
       compared["greatest_h"] = there;
@@ -302,7 +302,7 @@ json merge_shards(const std::vector<std::string>& files) {
   for (const std::string& file : files) {
     try {
       const json part = read_shard(file);
-      // What belongs to another campaign is that, and not a shard given twice.
+      // A shard of another campaign is reported as such, and not as given twice.
       if (whole.is_null()) {
         whole = part;
       } else {

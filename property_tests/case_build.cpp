@@ -1,4 +1,4 @@
-// What a backend loads of a case.
+// The input of a backend for a case.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -135,7 +135,7 @@ void add_moves(const Stroke& stroke, Vec3 first_node, const Case& c, Setup& setu
   if (stroke.down) setup.stroke_end.push_back((substeps - 1) / setup.step.substeps);
 }
 
-// The schedule (Setup): the strokes one after the other; in what is left of the last frame the blade is lifted.
+// The schedule (Setup): the strokes one after the other; in the rest of the last frame the blade is lifted.
 void add_schedule(const Case& c, Vec3 first_node, Setup& setup) {
   for (const Stroke& stroke : resolved_strokes(c)) add_moves(stroke, first_node, c, setup);
   const auto substeps = at(setup.step.substeps);

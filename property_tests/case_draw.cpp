@@ -231,7 +231,7 @@ void draw_presses(Random& random, Case& c) {
       if (way != 0) c.gravity[axis] = (way > 0 ? -1 : +1) * random.pick({30, 100, 300});
     }
   }
-  if (random.chance(0.5)) {  // it stands where it has come to, and what it has pushed settles against it
+  if (random.chance(0.5)) {  // the blade rests, and pushed tissue settles against it
     Stroke rest = c.strokes.back();
     rest.link = Link::chained;
     rest.from = rest.to;
@@ -263,7 +263,7 @@ CaseGrip draw_grip(Random& random, const Case& c) {
   return grip;
 }
 
-// Takes over what an earlier one releases, and some of what is beside it.
+// Takes over particles that an earlier grip releases, and some beside them.
 CaseGrip draw_next_grip(Random& random, const CaseGrip& earlier) {
   CaseGrip grip = earlier;
   ++grip.high[random.index(3)];
@@ -375,7 +375,7 @@ Case draw_case(uint64_t seed, int size) {
     c.cap = c.most + random.between(0, 3);
   }
   if (random.chance(0.3)) c.alpha = random.between(1, 9);
-  // By random numbers of its own: the rest of a case is what it was before there were crossings.
+  // By its own random numbers: crossings do not change the rest of a case.
   Random surface(seed ^ 0x5u);
   if (surface.chance(0.4)) c.surface = surface.between(1, 1'000'000);
   incline(random, c);

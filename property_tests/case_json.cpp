@@ -24,7 +24,7 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Stroke, from, to, back, down, link, tilt, alo
 
 }  // namespace cutproof::property_tests
 
-// By their names in model/rules.h; what has none is read as the first of them.
+// By their names in model/rules.h; an unknown name is read as the first value.
 namespace cutproof {
 template <NamedChoice E>
 void to_json(nlohmann::json& json, E choice) {
@@ -114,7 +114,7 @@ Case from_json(const std::string& text) {
   try {
     const auto document = nlohmann::json::parse(text);
     const Case c = document.get<Case>();
-    // What nlohmann reads without a word, such as a rule that does not exist, does not come back as it was.
+    // nlohmann accepts some errors, such as an unknown rule; these do not survive writing and reading.
     const nlohmann::json again = c;
     for (const auto& [key, value] : document.items()) {
       if (!again.contains(key)) throw std::invalid_argument("there is no field '" + key + "'");

@@ -25,7 +25,7 @@ void drop_chunks(std::size_t count, std::vector<T> Case::*list, Edits& edits) {
   }
 }
 
-// Without what lies on one side of a plane of the grid.
+// Without the particles on one side of a plane of the grid.
 void drop_slabs(const std::vector<Node>& nodes, Edits& edits) {
   for (std::size_t axis = 0; axis < 3 && !nodes.empty(); ++axis) {
     const auto [low, high] = extent(nodes, axis);

@@ -53,7 +53,7 @@ void note_blade(const Setup& setup, int64_t frame, CaseCoverage& seen) {
   }
 }
 
-// What of a setup has played a part in a step: something moved, and in more than free flight.
+// Parts of a setup that affected a step: something moved, and in more than free flight.
 void note_parameters(const Setup& setup, const State& before, const State& after, CaseCoverage& seen) {
   const StepParameters& step = setup.step;
   if (step.iterations == 0 || before.x == after.x) return;
@@ -170,7 +170,7 @@ void StepsCompared::join(const StepsCompared& other) {
 
 namespace {
 
-// What a probe of this case draws from, whatever load it is in.
+// The seed of a probe of this case, in any batch.
 uint64_t probe_seed(const Instance& loaded) {
   const State& state = loaded.state;
   return static_cast<uint64_t>(state.x.size()) ^
@@ -209,7 +209,7 @@ void probe_steps(Backend& backend, const std::vector<Instance>& loaded, std::vec
 
 namespace {
 
-// Adds up what they take.
+// Adds up their times.
 oracles::ReferenceStages timed_reference_stages(double& seconds) {
   oracles::ReferenceStages stages = harness::reference_stages();
   for (auto& stage : stages) {
@@ -239,7 +239,7 @@ std::vector<CaseRun> run_cases(Backend& backend, const std::vector<Instance>& lo
     runs[b].trace = std::move(traces.of_body[b]);
     runs[b].promises = promises;
     const State& initial = *runs[b].trace.initial;
-    // In single precision what is loaded is rounded; in double it comes back as it is.
+    // Loading rounds in single precision, and is exact in double.
     if (backend.precision() == Precision::binary64 && !(initial == loaded[b].state)) {
       runs[b].failure = harness::broken_contract("loading changes nothing", Stage::step, initial.frame);
     }
@@ -280,7 +280,7 @@ Judgement judge_case(const Case& c, const Instance& loaded, const CaseRun& run, 
   const auto compare = [&](Stage stage, const State& before, const State& after) {
     const oracles::StageDifference found = comparison.compare(stage, before, after, true);
     if (stage == Stage::step) judgement.compared.add(found);
-    // Of a backend that does not vouch for all that its rules promise the oracles judge what it does.
+    // For a backend that promises less than its rules, the oracles judge its own promises.
     if (run.promises.words == harness::kPromisesOfRules.words) take(found.verdicts("the reference's "));
   };
   if (run.probed >= 0) {
@@ -299,7 +299,7 @@ Judgement judge_case(const Case& c, const Instance& loaded, const CaseRun& run, 
     for (const harness::Judge::Unpromised& u : judge.unpromised()) {
       if (u.property == "isolation" && u.failing > 0) seen["uncoupled without promise"] = true;
     }
-    // What others ran for the backend is not judged, but it happened in the case all the same.
+    // Stages that the reference ran are not judged, but count in the coverage of the case.
     if (!moment.by_backend && moment.span.contains(Stage::skin) && !oracles::isolation(setup, after).holds) {
       seen["uncoupled without promise"] = true;
     }
@@ -321,7 +321,7 @@ Judgement judge_case(const Case& c, const Instance& loaded, const CaseRun& run, 
     if (stage == Stage::step && !c.moves) continue;
     // Nothing is compared with the middle of a span that goes on to the end of the frame.
     if (moment.span.contains(Stage::skin) && stage != Stage::skin) continue;
-    // The topology of the skin is a function of what is alive.
+    // The topology of the skin is a function of the living particles.
     const bool known = stage == Stage::skin && compared_skin && compared_skin->alive == after.alive &&
                        compared_skin->skin.owner == after.skin.owner &&
                        compared_skin->skin.direction == after.skin.direction &&

@@ -27,8 +27,9 @@ Stage stage_at(int32_t index) { return kStages[at(index % 6)]; }
 Stage before(Stage next) { return stage_at(static_cast<int32_t>(next) + 5); }
 
 // The first entry of a field in which anything but the kicked component differs between two runs through a step and a
-// detection; -1: none. What neither of these stages may change is equal as a whole. Of the rest particles and clusters
-// go by their component, lists are compared without its particles, and a sum over the body holds the kick itself.
+// detection; -1: none. Fields that neither stage may change must be equal as a whole. Of the rest particles and
+// clusters go by their component, lists are compared without its particles, and a sum over the body holds the kick
+// itself.
 template <class T>
 int64_t first_ghost(const Field& field, const T& still, const T& pushed, const Clusters& clusters,
                     const std::vector<int32_t>& component_of, int32_t kicked) {
@@ -81,7 +82,7 @@ Position after(Position at, const Command& command) {
 namespace {
 
 nlohmann::json json_of(const RunStages& run) { return {{"run", run.stages}, {"whole", run.whole}}; }
-// Strokes are written and read as parts of a case, which knows what is a stroke.
+// Strokes are written and read as parts of a case, whose reader knows their fields.
 nlohmann::json json_of(const Cut& cut) {
   Case c;
   c.strokes = {cut.stroke};
@@ -236,7 +237,7 @@ void History::change_schedule() {
 }
 
 void History::carry_out(const Kick& command) {
-  wait_for_frames(2);  // to see in the next one what came of it
+  wait_for_frames(2);  // to observe the effect in the next one
   const Setup& setup = loaded_.setup;
   const oracles::Partition components = oracles::graph_components(setup, state_);
   if (components.count == 0 || failure_) return;

@@ -54,7 +54,7 @@ rc::Gen<Stroke> random_strokes(const Case& c) {
   };
 }
 
-// Between frames more strokes; within them more loads, for there they have more to forget.
+// Between frames more strokes; within frames more loads, where loading loses more.
 rc::Gen<CommandPointer> random_commands(const Case& c, Position at) {
   const auto given = [](property_tests::Command command) -> CommandPointer {
     return std::make_shared<GivenCommand>(std::move(command));

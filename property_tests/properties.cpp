@@ -25,15 +25,15 @@
 namespace cutproof::property_tests {
 namespace {
 
-// What a backend loads, in its arithmetic.
+// The input of a backend, in its precision.
 Instance load_for(const Backend& backend, const Case& c) {
   Instance loaded = instance_of(c);
   loaded.state = in_arithmetic_of(backend, std::move(loaded.state));
   return loaded;
 }
 
-// Claims by compare-and-swap are legal under every schedule and not the same under each, so what is asked of bits is
-// asked of the rule that promises them.
+// Claims by compare-and-swap are legal under every schedule and differ between schedules, so equal bits are required of
+// the rule that promises them.
 Case without_claims(Case c) {
   if (c.merge != MergeRule::none) c.merge = MergeRule::deterministic;
   return c;
@@ -118,15 +118,15 @@ TEST_P(EveryBackend, GivesTheSameAnswerToASceneTurnedShiftedScaledOrRenumbered) 
   check(id(), cases_of(10), GetParam().most_size, [&](const Case& c) {
     const Instance loaded = load_for(*backend_, without_claims(c));
     if (loaded.setup.frame_count() == 0) return std::string();
-    // Which clusters are merged depends on their numbers; without I4 so does what is coupled afterwards.
+    // The merged clusters depend on their numbers; without I4 so does the coupling afterwards.
     const bool decided = loaded.state.edge_covered || c.merge == MergeRule::none;
     const Span span = decided ? Span{} : Span{Stage::step, Stage::split};
     return text_of(oracles::equivariance(*backend_, loaded.setup, loaded.state, span, c.seed));
   });
 }
 
-// What is left of a body after all strokes, every particle displaced by up to 0.3 h along each axis, and a setup that
-// moves it: one frame of one substep of 3 iterations, without a blade.
+// The rest of a body after all strokes, every particle displaced by up to 0.3 h along each axis, and a setup that moves
+// it: one frame of one substep of 3 iterations, without a blade.
 Instance cut_and_disturbed(Backend& backend, const Case& c) {
   Instance loaded = load_for(backend, c);
   backend.load({loaded.setup}, {loaded.state});
@@ -455,7 +455,8 @@ TEST(Paths, OfTheDeviceGiveTheBitsOfTheHostAloneAndInALoad) {
                    paths);
 }
 
-// A large load runs other kernels, with fewer lanes for each group and each cluster: so large that all of them do.
+// A large batch runs other kernels, with fewer lanes for each group and each cluster: large enough for all of these
+// kernels.
 TEST(Paths, OfTheDeviceGiveTheBitsOfTheHostInALargeLoad) {
   constexpr int32_t kCopies = 72;
   constexpr const char* kDevice = "gpu";

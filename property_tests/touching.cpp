@@ -9,9 +9,10 @@
 namespace cutproof::property_tests {
 namespace {
 
-// [h] What is put at a distance is there up to rounding, also in single precision; to be so near by chance is rare.
+// [h] A particle placed at a distance is there up to rounding, also in single precision; chance rarely places one so
+// near.
 constexpr double kTouching = 1e-4, kExactly = 1e-5;
-// What was led round a side stands right over it, at most this far from the plane; beyond, it is there by chance [ρ].
+// A particle led round a side stands right over it, at most this far from the plane; beyond, it is there by chance [ρ].
 constexpr double kFarthestLed = 3;
 // [h] of one substep, along a surface: it stuck; it slid, and a neighbour would have taken others along.
 constexpr double kStuck = 1e-5, kSlid = 1e-4;

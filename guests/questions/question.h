@@ -70,8 +70,8 @@ struct OperationDescription {
   std::vector<std::string> (*large_kinds)() = nullptr;
   std::span<const int64_t> sizes = {};
   Question (*draw_large)(uint64_t seed, int64_t kind, int64_t size, Precision precision) = nullptr;
-  // Of a whole simulator, whose promises are those of runs. Null for all others.
-  // `draw` within what a plugin states; throws InputError for words of its that there are not.
+  // Of a whole simulator, whose promises are those of runs. Null for all others. `draw` within what a plugin states;
+  // throws InputError for unknown words.
   Question (*draw_for)(uint64_t seed, int64_t index, const PluginInfo& plugin) = nullptr;
   // The property whose verdict is not vacuous if a question matches its kind.
   std::string_view as_drawn = {};

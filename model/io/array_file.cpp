@@ -44,7 +44,7 @@ Format format_of(const std::string& path) {
   constexpr std::array<char, 8> kHdf5 = {'\x89', 'H', 'D', 'F', '\r', '\n', '\x1a', '\n'};
   std::array<char, 8> begin = {};
   std::ifstream stream;
-  stream.exceptions(std::ios::badbit);  // a lack of memory shows as what it is
+  stream.exceptions(std::ios::badbit);  // a lack of memory is reported as such
   stream.open(path, std::ios::binary);
   if (!stream.is_open()) {
     if (errno == ENOMEM) throw std::bad_alloc();

@@ -14,8 +14,8 @@ namespace {
 struct Range {
   uint32_t first, last;
 };
-// Unicode 15: combining marks and what has no width by itself; East Asian wide characters and emoji. Of each block the
-// part that can come from a file's name.
+// Unicode 15: combining marks and other characters without width; East Asian wide characters and emoji. Of each block
+// the part that can come from a file's name.
 constexpr std::array<Range, 7> kNoWidth = {{{0x0300, 0x036F},
                                             {0x0483, 0x0489},
                                             {0x0591, 0x05BD},
@@ -40,7 +40,7 @@ bool lies_in(uint32_t code, const std::array<Range, N>& ranges) {
                      [code](const Range& range) { return range.first <= code && code <= range.last; });
 }
 
-// What a terminal takes as one: bytes, and columns.
+// A unit of a terminal: bytes, and columns.
 struct Glyph {
   std::size_t bytes = 1, columns = 1;
 };
@@ -53,7 +53,7 @@ Glyph glyph_at(const std::string& text, std::size_t at) {
     while (end < text.size() && (byte(end) == ';' || (byte(end) >= '0' && byte(end) <= '9'))) ++end;
     if (byte(end) == 'm') return {end + 1 - at, 0};
   }
-  // What may not be printed stands there as its escape (model/printable.h).
+  // An unprintable character is shown as its escape (model/printable.h).
   const std::string_view rest = std::string_view(text).substr(at);
   const Character character = first_character(rest);
   if (character.bytes == 0) return {1, 4};
@@ -93,7 +93,7 @@ std::string cut_to(const std::string& text, std::size_t columns) {
 std::string cut_to_words(const std::string& text, std::size_t columns) {
   const std::size_t end = cut_to(text, columns).size();
   if (end == text.size()) return text;
-  // What separates may itself be beyond the end.
+  // The separator may lie beyond the end.
   for (const char* const separator : {", ", " "}) {
     const std::size_t at = text.rfind(separator, end);
     if (at != std::string::npos) return text.substr(0, at);

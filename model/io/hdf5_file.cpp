@@ -70,13 +70,13 @@ std::vector<hsize_t> extents(hsize_t rows, const Layout& row) {
   return dims;
 }
 
-// More than one call needs for what it keeps and for its work on chunks of ours: 1 MiB is a table's cache.
+// More than one call needs for its results and its work on chunks of ours: 1 MiB is a table's cache.
 constexpr std::size_t kReserveBytes = std::size_t{8} << 20;
 
 struct Free {
   void operator()(void* block) const { std::free(block); }
 };
-std::unique_ptr<void, Free> reserve;  // for closing what is open when an exception has been thrown
+std::unique_ptr<void, Free> reserve;  // for closing handles after an exception
 
 void* allocated(std::size_t bytes) {
   void* const block = std::malloc(bytes);
@@ -88,7 +88,7 @@ void* allocated(std::size_t bytes) {
 }
 
 // HDF5 1.10 does not survive an allocation that fails within it: it follows null pointers, ends the process or recurses
-// without end. So what it may need is asked for before it is called. `more`: bytes beyond what any call needs.
+// without end. So the memory that it may need is tested before each call. `more`: bytes beyond those of any call.
 void require_memory(std::size_t more = 0) {
   if (reserve == nullptr) reserve.reset(allocated(kReserveBytes));
   void* volatile block = allocated(kReserveBytes + more);  // volatile: keeps the compiler from removing unused memory
@@ -107,14 +107,13 @@ herr_t keep_deepest(unsigned depth, const H5E_error2_t* error, void* reason) {
   return 0;
 }
 
-// What the library says of the last call that failed: its innermost reason. Throws std::bad_alloc if that is a lack of
-// memory.
+// The library's innermost reason of the last failed call. Throws std::bad_alloc if that is a lack of memory.
 std::string last_message() {
   Reason reason;
   H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, keep_deepest, &reason);
   if (reason.no_memory) throw std::bad_alloc();
   const std::string& text = reason.text;
-  // Failures of the system come with addresses and times; what a person needs is in the quotation marks.
+  // Failures of the system come with addresses and times; the useful part is in the quotation marks.
   constexpr std::string_view kSystem = "error message = '";
   if (const std::size_t at = text.find(kSystem); at != std::string::npos) {
     const std::size_t from = at + kSystem.size();
@@ -151,13 +150,13 @@ void require_hard_links(hid_t parent, const std::string& name) {
   for (std::size_t end = name.find('/', 1);; end = name.find('/', end + 1)) {
     const std::string part = name.substr(0, end);
     H5L_info_t link;
-    if (part == "/" || H5Lget_info(parent, part.c_str(), &link, H5P_DEFAULT) < 0) return;  // opening says what is wrong
+    if (part == "/" || H5Lget_info(parent, part.c_str(), &link, H5P_DEFAULT) < 0) return;  // opening reports the error
     if (link.type != H5L_TYPE_HARD) throw Error(name, "This is a link to something elsewhere.");
     if (end == std::string::npos) return;
   }
 }
 
-// That what a dataset holds lies in its file, and becomes what it is by HDF5 alone.
+// Checks that the data of a dataset lie in its file, behind HDF5's own filters alone.
 void require_own_storage(const Id& creation, const std::string& name) {
   if (H5Pget_layout(creation.get()) == H5D_VIRTUAL) {
     throw Error(name, "This is a virtual dataset: its numbers lie in other files.");
@@ -403,7 +402,7 @@ Table Table::open(hid_t parent, const std::string& name, const Layout& row, uint
     }
     table.chunk_bytes_ = bytes;
   }
-  // A damaged extent must not make us allocate what the file cannot hold.
+  // A damaged extent must not make us allocate more than the file can hold.
   const uint64_t stored = std::min<uint64_t>(H5Dget_storage_size(table.id_.get()), file_bytes);
   const uint64_t most = stored > std::numeric_limits<uint64_t>::max() / kMostCompression
                             ? std::numeric_limits<uint64_t>::max()
@@ -445,7 +444,7 @@ void Table::read(int64_t first, int64_t count, void* values) const {
 
 namespace {
 
-// Names as an iteration meets them. Exceptions must not cross HDF5, so what is wrong is kept.
+// Names as an iteration meets them. Exceptions must not cross HDF5, so the error is kept.
 struct Met {
   std::size_t most;
   std::vector<std::string> names;
@@ -493,7 +492,7 @@ std::vector<std::string> attribute_names(hid_t object, std::size_t most) {
   return met.names;
 }
 
-// What values are, from their type and extent.
+// The kind of values, from their type and extent.
 void Values::look(Id type, const Id& space, uint64_t most_bytes) {
   const H5T_class_t kind = H5Tget_class(type.get());
   std::size_t bytes = H5Tget_size(type.get());

@@ -73,7 +73,7 @@ uint64_t require_regular_file(const std::string& path) {
 
 std::string read_file(const std::string& path, std::string_view what, uint64_t most) {
   if (require_regular_file(path) > most) fail_too_large(path, what, most);
-  // What lies there may be another thing by now: opening it must not wait.
+  // The file may have been replaced: opening it must not wait.
   const Descriptor file(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY));
   if (file.get() < 0) fail_to_open(path, errno);
   struct stat status = {};

@@ -23,8 +23,8 @@ std::string position_text(const std::string& text, std::size_t byte) {
   return fmt::format("line {}, column {}", line, column);
 }
 
-// Counts what the text would become, without making it: brackets and separators outside of texts. In what is no JSON it
-// counts too many at most, and never too few of what the parser makes before it stops.
+// Counts what the text would become, without making it: brackets and separators outside of texts. In a text that is not
+// JSON it counts at most too many, and never fewer than the parser makes before it stops.
 void require_within(const std::string& text, const std::string& file, const JsonLimits& limits) {
   constexpr const char* kRemedy =
       "Check that this is the intended file, or make it smaller (docs/reference/limits.md).";

@@ -18,7 +18,7 @@ bool holds_utf8(const json& value) {
   return true;
 }
 
-// The same with what is no UTF-8 written out.
+// The same with bytes that are not UTF-8 written out.
 json as_utf8(const json& value) {
   if (value.is_string()) {
     const auto& text = value.get_ref<const std::string&>();
@@ -36,7 +36,7 @@ json as_utf8(const json& value) {
   return result;
 }
 
-// Of JSON: what is not printable stands within texts, where its number may stand for it.
+// Of JSON: unprintable characters occur only within texts, where their numbers may replace them.
 std::string with_numbers(std::string_view text) {
   std::string result;
   while (!text.empty()) {

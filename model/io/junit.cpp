@@ -64,7 +64,7 @@ struct Counts {
   }
 };
 
-// What stands inside of a <testcase>: nothing, or one element.
+// Contents of a <testcase>: empty, or one element.
 std::string inside(const JunitCase& one) {
   const std::string text = escaped(one.text, false);
   switch (one.outcome) {

@@ -9,7 +9,7 @@ namespace {
 
 std::string count_text(uint64_t count) { return grouped(static_cast<long long>(count)); }
 
-// What is read, where that is another thing than in the row before, and below it one limit.
+// The kind of input, where it differs from the previous row, and below it one limit.
 std::string row(std::string_view file, std::string_view what, const std::string& most) {
   const std::string head = file.empty() ? "" : fmt::format("- {}\n", file);
   return wrapped_text(fmt::format("{}  - {}: {}\n", head, what, most));

@@ -163,7 +163,7 @@ class NpzReader {
     } catch (const DamagedArchive& error) {
       refuse("", fmt::format("The archive cannot be read: {}.", error.what()), kNpzRemedy);
     }
-    // The directory says how large everything is: what is too large is refused before any of it is inflated.
+    // The directory has all sizes: too large an entry is refused before inflating.
     for (const ZipEntry& entry : entries_) require_size_of(entry);
     for (const ZipEntry& entry : entries_) {
       name_ = entry.name;
@@ -204,7 +204,7 @@ class NpzReader {
     uint64_t left = entry.bytes;
     const NpyHeader header = read_npy_header(left);
     read_values(header, left);
-    // Reading on to the end is what checks the sum.
+    // Reading to the end checks the sum.
     char more;
     if (archive_->read(&more, 1) != 0) refuse(name_, "It goes on after its end.", kNpzRemedy);
   }

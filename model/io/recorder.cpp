@@ -58,7 +58,7 @@ void require_lengths(const Setup& setup, const State& state) {
   }
 }
 
-// Runs an action that writes. `what`, a sentence without its end: what it means if the disk does not take it.
+// Runs an action that writes. `what`: the failure if the disk fails, a sentence without a full stop.
 template <class F>
 auto writing(const std::string& file, const std::string& what, F&& action) {
   const hdf5::Quiet quiet;
@@ -91,7 +91,7 @@ struct Recorder::File {
     }
   };
 
-  // Where the rows of a field go, and what is there.
+  // Where the rows of a field go, and the rows written so far.
   struct Track {
     hdf5::Table own;               // unless they are the points of a VTKHDF file
     hdf5::Table* table = nullptr;  // where they go
@@ -112,7 +112,7 @@ struct Recorder::File {
   std::string name;
   Setup setup;
   std::vector<double> starts;          // [frames + 1] of frames [s]
-  Digest beginning, digest;            // of what the run begins with, and of all
+  Digest beginning, digest;            // of the initial state, and of all states
   std::optional<Precision> precision;  // of all states
   bool absolute_coordinates = false;   // of any state
   bool is_open = true;                 // false: finished, or something could not be written
@@ -122,7 +122,7 @@ struct Recorder::File {
   Shown particles, skin, blade;
   hdf5::Table particle_table, cluster_table;
 
-  // One row per snapshot. Whatever did not change since the snapshot before is stored once.
+  // One row per snapshot. Fields that did not change from the previous snapshot are stored once.
   SnapshotColumns columns;
   std::vector<Track> tracks = std::vector<Track>(recorded_fields().size());
   Latest cluster_rows, blade_points;
@@ -193,7 +193,7 @@ Recorder::File::File(const std::string& given_name, const Setup& given, const st
   }
 }
 
-// Whether the triangles or what they stand on differ from those of the snapshot before; positions aside.
+// Whether the triangles or the owners of their vertices differ from those of the previous snapshot; positions aside.
 bool Recorder::File::is_new_mesh(const State& state) const {
   for (std::size_t k = 0; k < tracks.size(); ++k) {
     const RecordedField& recorded = recorded_fields()[k];
@@ -254,7 +254,7 @@ void Recorder::File::add(Stage stage, const State& state) {
   for (std::size_t c = 0; c < kCountColumns.size(); ++c) {
     columns.counts[c].push_back(count_of(kCountColumns[c].space, state));
   }
-  // Positions are written anew with new triangles: VTK takes equal points for an equal mesh.
+  // Positions are written again with new triangles: VTK takes equal points for an equal mesh.
   const bool new_mesh = is_new_mesh(state);
   for (std::size_t k = 0; k < tracks.size(); ++k) {
     const RecordedField& recorded = recorded_fields()[k];

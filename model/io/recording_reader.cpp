@@ -48,7 +48,7 @@ hdf5::File open_part(const std::string& path, const char* kind) {
   constexpr std::array<char, 8> kSignature = {'\x89', 'H', 'D', 'F', '\r', '\n', '\x1a', '\n'};
   std::array<char, 8> begin = {};
   std::ifstream stream;
-  stream.exceptions(std::ios::badbit);  // a lack of memory shows as what it is
+  stream.exceptions(std::ios::badbit);  // a lack of memory is reported as such
   stream.open(path, std::ios::binary);
   if (!stream.is_open()) {
     if (errno == ENOMEM) throw std::bad_alloc();
@@ -126,7 +126,7 @@ struct RecordingReader::File {
     hdf5::File file;
     hdf5::InflationBudget* budget = nullptr;
 
-    // Runs an action on what it holds.
+    // Runs an action on its contents.
     template <class F>
     void reading(F&& action, const char* remedy = kRemedy) const {
       try {
@@ -355,7 +355,7 @@ constexpr const char* kShownRemedy =
     "Copy all files of the recording again, or record the scene again. A program that writes recordings can leave out "
     "the group VTKHDF/Steps.";
 
-// What a step has to show of the particles or of the skin, but for what depends on what else is in the file.
+// Expected contents of a step for the particles or the skin, except those that depend on the rest of the file.
 ShownStep RecordingReader::File::shown(IndexSpace points, std::size_t step) const {
   const std::size_t i = steps[step].snapshot;
   ShownStep wanted;

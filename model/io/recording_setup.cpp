@@ -96,7 +96,7 @@ void walk_setup(Archive& archive, S& setup) {
   });
 }
 
-// What it walks over goes into a digest.
+// A visitor that digests fields.
 class DigestArchive {
  public:
   static constexpr bool kReading = false;

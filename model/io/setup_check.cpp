@@ -20,7 +20,7 @@ using Defect = std::optional<SetupDefect>;
 
 // --- Each number by itself: what model/setup_fields.h says of it ---
 
-// What is wrong with a value, as the rest of a sentence that begins with its name; nothing if it is as it should be.
+// The defect of a value, as the rest of a sentence that begins with its name; empty if there is none.
 std::optional<std::string> problem_of(const SetupField& field, double value) {
   if (!std::isfinite(value)) return fmt::format("is {}, and should be finite.", value);
   if (field.above ? value > field.least : value >= field.least) return std::nullopt;

@@ -16,7 +16,7 @@ Array vectors(std::string name, const std::vector<Vec3>& all, std::vector<int64_
 }
 Array number(std::string name, double value) { return make_array<double>(std::move(name), {}, {value}); }
 
-// What is given once: the body and how it is simulated.
+// Arrays that are given once: the body and the parameters of its simulation.
 void add_once(const Setup& setup, Precision precision, Arrays& arrays) {
   const Body& body = setup.body;
   const int64_t n = body.particle_count();

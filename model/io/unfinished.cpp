@@ -74,7 +74,7 @@ int64_t take_number(std::string_view& text, char end) {
   return number;
 }
 
-// What names of this machine end with.
+// The ending of names of this machine.
 std::string name_tail() { return fmt::format("-{}.tmp", machine_tag()); }
 
 // The process that has left a file of this name, as unfinished_name() makes them on this machine; 0: it is another.

@@ -46,9 +46,10 @@ void PolyDataFile::finish(const std::vector<Step>& given) {
   std::vector<Step> steps = given;
   if (steps.empty()) steps.push_back({0, kNothing, 0, std::vector<int64_t>(data_names_.size(), 0)});
 
-  // Where the offsets of a part begin is not stored in the file. VTK of 2023 takes CellOffsets + PartOffsets; since
-  // 2024 it counts the parts before it until their cells add up to CellOffsets, and so passes over parts without
-  // cells. The two agree if no part without cells stands before one that has some: the part of nothing comes last.
+  // The beginning of the offsets of a part is not stored in the file. VTK of 2023 takes CellOffsets + PartOffsets; VTK
+  // of 2024 and newer counts the parts before it until their cells add up to CellOffsets, and so passes over parts
+  // without cells. The two agree if no part without cells stands before one that has some: the part of nothing comes
+  // last.
   if (std::any_of(steps.begin(), steps.end(), [](const Step& step) { return step.part == kNothing; })) {
     const std::array<int64_t, 1> no_cells = {0};
     const Part nothing = add_part(0, no_cells, {});
@@ -151,7 +152,7 @@ void read_cells(const ReadingArchive& group, bool ours, int64_t corners, Parts& 
   if (ours) parts.cells = std::move(cells);
 }
 
-// Tables of parts and steps are read by entries, each of which must be what `wanted` says of step i.
+// Tables of parts and steps are read by entries, each of which must equal `wanted` for step i.
 template <class T, class Wanted>
 std::vector<T> read_steps(const ReadingArchive& group, const std::string& name, int64_t steps, const Wanted& wanted) {
   require_rows(group, name, group.table(name, hdf5::layout_of<T>()).rows(), steps);

@@ -21,7 +21,7 @@ constexpr std::size_t kHeaderBytes = 30, kInDirectoryBytes = 46, kEndBytes = 22,
                       kLocatorBytes = 20, kLongestText = 65535;
 // In place of a number that has 64 bits, and stands elsewhere.
 constexpr uint64_t kElsewhere = 0xFFFFFFFF, kCountElsewhere = 0xFFFF;
-constexpr uint16_t kLargeNumbers = 1;  // what holds them, among the extra fields of an entry
+constexpr uint16_t kLargeNumbers = 1;  // their field, among the extra fields of an entry
 
 // A number with its least byte first, as numbers of this machine are (array_file.cpp).
 template <class T>
