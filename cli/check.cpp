@@ -67,7 +67,7 @@ int check_recording(const CheckOptions& options) {
     for (const Verdict& verdict : wrong) judge.add(verdict);
   }
   if (depth == harness::Depth::motion) {
-    judge.note("A recording cannot be run: relations between runs, such as 'no ghost force', were not asked of it.");
+    judge.note("A recording cannot be run: relations between runs, such as 'no ghost force', were not judged.");
   }
   judge.finish();
   // The file first: it is kept even if standard output cannot be written.

@@ -36,7 +36,8 @@ static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_alw
 }
 
 void say_that_it_stops() {
-  constexpr char kText[] = "\ncutproof: stopping; what there is will be written.\n  A second signal ends it at once.\n";
+  constexpr char kText[] =
+      "\ncutproof: stopping; the results so far will be written.\n  A second signal ends it at once.\n";
   if (isatty(STDERR_FILENO) == 0) return;
   [[maybe_unused]] const ssize_t written = write(STDERR_FILENO, kText, sizeof kText - 1);
 }

@@ -16,10 +16,11 @@ OpenRecording open_recording(const std::string& name) {
   const bool is_ours = !recording.backend.starts_with("plugin:");
   const harness::BackendDescriptor* const backend = is_ours ? harness::find_backend(recording.backend) : nullptr;
   if (backend != nullptr && backend->precision != recording.precision) {
-    throw InputError(io::recording_paths(name).index, "unit_roundoff",
-                     fmt::format("This is {}, and the backend {} has {}.", unit_roundoff(recording.precision),
-                                 backend->name, unit_roundoff(backend->precision)),
-                     "A program that writes recordings gives its own name as `backend`; else record the scene again.");
+    throw InputError(
+        io::recording_paths(name).index, "unit_roundoff",
+        fmt::format("This is {}, and the backend {} has {}.", unit_roundoff(recording.precision), backend->name,
+                    unit_roundoff(backend->precision)),
+        "A program that writes recordings must give its own name as `backend`; otherwise record the scene again.");
   }
   static_cast<fixtures::RecordedScene&>(opened) = fixtures::scene_of(*opened.reader, name);
   return opened;

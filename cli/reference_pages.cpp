@@ -204,14 +204,13 @@ constexpr const char* kExitStatus[][2] = {{"0", "Everything holds."},
                                           {"3", "The machine failed: memory, disk, device."},
                                           {"77", "A plugin cannot run here."},
                                           {"128 + n",
-                                           "Signal n ended it. fuzz, judge, tune and bench write what they "
-                                           "have first; a second signal ends them at once."}};
+                                           "Signal n ended the program. fuzz, judge, tune and bench first write their "
+                                           "results so far; a second signal ends them at once."}};
 
 constexpr const char* kEnvironment[][2] = {
-    {"CUTPROOF_GUEST", "The program cutproof-guest, in which plugins run, where it is not beside cutproof."},
-    {"COLUMNS",
-     "How wide errors are on a terminal, if this is a number; otherwise as wide as it is, 80 columns at most."},
-    {"CUTPROOF_COMMIT", "What documents of fuzz and bench tell as the commit that was run."}};
+    {"CUTPROOF_GUEST", "Path of cutproof-guest, the program that runs plugins, if it is not beside cutproof."},
+    {"COLUMNS", "Width of errors on a terminal; default: the terminal's width, at most 80 columns."},
+    {"CUTPROOF_COMMIT", "Commit that documents of fuzz and bench name."}};
 
 constexpr const char* kExamples[][2] = {
     {"cutproof run kidney_discontinuous --check", "Cuts a kidney in two steps and certifies every frame."},
@@ -333,10 +332,9 @@ std::string manual_page(const CLI::App& program, const std::string& date) {
   });
   page += ".fi\n.SH DESCRIPTION\n";
   page += paragraph(
-      "Cuts a body made of shape matching clusters, by a reference, by kernels, or by a program of yours, and "
-      "certifies "
-      "every frame: nothing that is separate is coupled, nothing is lost, the skin shows what is simulated, the motion "
-      "is one of those that could be.");
+      "Cuts a body made of shape matching clusters with a reference, with kernels, or with your program, and certifies "
+      "every frame: separate pieces are not coupled, no tissue is lost, the skin shows the simulated tissue, and the "
+      "motion is admissible.");
   page += ".SH COMMANDS\n" + verbs;
   const auto table = [&](const char* title, const auto& rows) {
     page += fmt::format(".SH {}\n", title);

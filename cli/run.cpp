@@ -154,7 +154,7 @@ std::string how_far(const RunSession& session, const fixtures::Built& built) {
 }
 
 constexpr const char* kConservation = "conservation";
-constexpr const char* kNotConserved = "the body alone keeps its momentum or its energy less well than its bound says";
+constexpr const char* kNotConserved = "the momentum or energy of the free body changes by more than its bound";
 
 io::JunitCase conservation_case(const harness::Errors& errors, const Judging& judging) {
   io::JunitCase one{kConservation, judging.class_name};
@@ -348,9 +348,8 @@ int run(const RunOptions& options) {
   Scene scene = io::read_scene(options.scene.file, changes);
   std::vector<std::string> notes;
   if (const auto not_asked = take_replaced_counts(options.scene, scene.expect); !not_asked.empty()) {
-    notes.push_back(
-        fmt::format("Of how many {} there are, what the scene expects was not asked: {} makes another number.",
-                    fmt::join(not_asked, " and "), options.scene.particles ? "--particles" : "--spacing"));
+    notes.push_back(fmt::format("The expected number of {} was not judged: {} changes it.",
+                                fmt::join(not_asked, " and "), options.scene.particles ? "--particles" : "--spacing"));
   }
   const fixtures::Built built = with_sources(options.scene.file, changes,
                                              [&] { return fixtures::build(scene, options.scene.file, build_options); });
@@ -361,7 +360,7 @@ int run(const RunOptions& options) {
     refuse("--junit", "nothing is judged, so there are no test cases", "add --check or --against");
   }
   if (!options.baseline.empty() && !observers.judge && !observers.against) {
-    refuse("--baseline", "nothing is judged that could be compared with it", "add --check or --against");
+    refuse("--baseline", "there are no verdicts to compare with it", "add --check or --against");
   }
   const std::optional<Baseline> baseline =
       read_baseline(options.baseline, {"cutproof.run", "cutproof.check"}, scene.name);

@@ -52,7 +52,7 @@ std::string scene_file(const std::string& given) {
   if (std::binary_search(names.begin(), names.end(), given)) return (scene_folder() / (given + ".json")).string();
   if (names.empty()) return given;
   throw InputError(
-      given, "", "There is no file of this name, and no scene that comes with the program is called so.",
+      given, "", "There is no file, and no included scene of this name.",
       did_you_mean(given, names) + fmt::format("Give a scene file, or one of: {}.", fmt::join(names, ", ")));
 }
 

@@ -68,7 +68,7 @@ void print_beginning(const TuneOptions& options, const json& document, const Sce
   say("scene {}: {}\n", printable(given.name), printable(given.description));
   print_build(built);
   if (options.without_skin && given.expect.shells_at_end) {
-    say("--without-skin does nothing: the scene expects shells of its skin\n");
+    say("--without-skin has no effect: the scene expects shells of its skin\n");
   }
 }
 
@@ -189,21 +189,22 @@ void print_found(const TuneOptions& options, const json& document) {
   const std::string tuned =
       io::filled("{1e3*median:.3f} ms a frame ({1e3*min:.3f} to {1e3*max:.3f})", found.at("seconds_per_frame"));
   if (index == 0) {
-    say("\nfound: nothing that is cheaper; the scene as it was given is within the tolerance\n  {}\n", tuned);
+    say("\nfound: nothing cheaper; the scene as given is within the tolerance\n  {}\n", tuned);
   } else {
     const auto ratio = found.at("times_cheaper").get<double>();
     say_filled("\nfound: {substeps} × {iterations}, acceleration {acceleration}", trial);
     if (trial.at("differences") != "") say_filled(", {differences}", trial);
     say("\n  {}, as given {}: {}\n", tuned, ms_and_range(found.at("seconds_per_frame_as_given")),
         ratio >= 1 ? fmt::format("{:.2f} times cheaper", ratio)
-                   : fmt::format("{:.2f} times as expensive, and what was given is not within", 1 / ratio));
+                   : fmt::format("{:.2f} times as expensive, and the scene as given is not within", 1 / ratio));
   }
   say_filled("  verified: RMS {rms_h:.2g} h, max {max_h:.2g} h ", found.at("verified"));
   const json& level = document.at("reference").at("levels").back();
   say("from the {}", level_text(level));
   say_filled(", {apart_h:.2g} h from the one before; ", level);
   say_filled("{verdicts} verdicts hold\n", found);
-  if (options.frames) say_filled("  the scene was written whole, and looked at for {frames} frames only\n", document);
+  if (options.frames)
+    say_filled("  the scene was written completely, but only {frames} frames were judged\n", document);
 }
 
 void print(const TuneOptions& options, TuneStep step, const json& document, const Scene& given,
@@ -224,13 +225,11 @@ void print(const TuneOptions& options, TuneStep step, const json& document, cons
     case TuneStep::found:
       return print_found(options, document);
     case TuneStep::reference_unknown:
-      insist(
-          "the reference solution is {}, so nothing can be said to be within {:g} h of it.\n"
-          "  Give a greater tolerance{}.\n",
-          document.at("reference").at("known_text").get<std::string>(), options.tolerance,
-          options.reference == ReferenceKind::limit
-              ? ", fewer --frames, or --reference substeps, which takes the scene's time step as given"
-              : " or fewer --frames");
+      insist("the reference solution is {}, too uncertain for a tolerance of {:g} h.\n  Give a greater tolerance{}.\n",
+             document.at("reference").at("known_text").get<std::string>(), options.tolerance,
+             options.reference == ReferenceKind::limit
+                 ? ", fewer --frames, or --reference substeps, which takes the scene's time step as given"
+                 : " or fewer --frames");
       return;
     case TuneStep::none_within:
       insist("none of {} configurations is within {:g} h of the reference solution, itself {}\n",

@@ -96,7 +96,7 @@ CLI::Validator one_of(std::vector<std::string> words) {
   const std::string all = fmt::format("{}", fmt::join(words, ", "));
   CLI::Validator validator{[words = std::move(words), all](std::string& given) -> std::string {
                              if (std::find(words.begin(), words.end(), given) != words.end()) return {};
-                             return fmt::format("{} is none of its words: {}use one of {}", quoted_short(given),
+                             return fmt::format("{} is not one of its words: {}use one of {}", quoted_short(given),
                                                 did_you_mean(given, words), all);
                            },
                            ""};

@@ -42,10 +42,10 @@ TEST_F(SceneNames, GiveWayToFiles) {
 }
 
 TEST_F(SceneNames, ThatThereAreNotAreRefusedWithThoseThatThereAre) {
-  expect_refused("run kidny", {"kidny", "no scene that comes with the program", "kidney_arc", "three_cuts"});
+  expect_refused("run kidny", {"kidny", "no included scene of this name", "kidney_arc", "three_cuts"});
   expect_refused("run kidny.json", {"kidny.json", "no such file"});
   expect_refused("run ./small_block", {"./small_block", "no such file"});
-  expect_refused("tune kidny --tolerance 1", {"kidny", "no scene that comes with the program"});
+  expect_refused("tune kidny --tolerance 1", {"kidny", "no included scene of this name"});
 }
 
 // What the page of runs says of scenes: a body that nothing holds is pushed away, one that is held is cut, and a
