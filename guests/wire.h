@@ -23,7 +23,7 @@ inline constexpr unsigned char kCanary = 0xc5;
 // Device arrays have so many bytes of canary on both sides.
 inline constexpr int64_t kDeviceCanary = 4096;
 
-// By bit in Hello::operations; those of cutproof/plugin.h.
+// Bits of Hello::operations: the operations of cutproof/plugin.h.
 enum Operation : uint32_t { rotations, components, surface, clusters, load, run, dissect };
 
 enum class Role : int32_t {

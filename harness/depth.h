@@ -1,4 +1,4 @@
-// How much of a run is judged.
+// The depth of judging a run.
 #pragma once
 #include <array>
 #include <optional>

@@ -23,7 +23,7 @@ struct ErrorsWanted {
   int64_t frames = 8;
 };
 
-// Of the free body whose momentum and energy are followed.
+// Number of frames of the free body whose momentum and energy are followed.
 inline constexpr int64_t kFreeFrames = 1000;
 // Bound of the relative drift of momentum, in double precision (tolerances.md, Conservation).
 inline constexpr double kDoubleDrift = 1e-10;

@@ -11,7 +11,7 @@
 
 namespace cutproof::harness {
 
-// How much of its scene a run is.
+// The part of its scene that a run has reached.
 enum class Extent {
   whole,
   cut_short  // it was asked to stop before the scene's end

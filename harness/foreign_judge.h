@@ -18,7 +18,7 @@ struct ForeignVerdicts {
   std::vector<Verdict> verdicts;
   std::vector<NotJudged> not_judged;  // in the order of the registry
   std::vector<std::string> notes;     // notes for the reader of the verdicts, one sentence each
-  // How many pieces the living tissue is in, and in words; nothing of a state that is not well formed.
+  // The number of pieces of living tissue, and in words; empty for a state that is not well formed.
   std::optional<int64_t> pieces;
   std::string pieces_in_words;
   int64_t coincident = 0;  // living particles that rest where another one does

@@ -47,7 +47,7 @@ class Judge {
   bool has_expanded() const { return has_expanded_; }
   int64_t frame() const { return frame_; }  // in progress
 
-  // For reports, from results that are known already. Of the last state seen, 0 if that is not well formed.
+  // For reports: counts of the last state seen, from known results; 0 if that state is not well formed.
   int32_t component_count();
   int32_t inner_shells();
 

@@ -10,7 +10,7 @@
 
 namespace cutproof::harness {
 
-// Of one property after one stage.
+// Summary of one property after one stage.
 struct PropertySummary {
   std::string property;
   Stage stage = Stage::skin;
@@ -25,7 +25,7 @@ struct PropertySummary {
   std::optional<double> of_bound;
 };
 
-// As it stands in result documents; an entry of another document is added to it.
+// The entry of a result document; entries of other documents can be added.
 nlohmann::json to_json(const PropertySummary& summary);
 void add_summary(nlohmann::json& sum, const nlohmann::json& more);
 

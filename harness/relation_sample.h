@@ -31,7 +31,7 @@ class RelationSample {
   void see(const Moment& moment);
   // Until what was asked last is answered.
   void wait();
-  // Of what has been asked all but the last frame, and that one too after wait().
+  // Verdicts of all judged frames but the last, and of the last one after wait().
   std::vector<Verdict> take_verdicts();
 
   // Number of judged frames, and relations that this backend cannot run: one sentence each.

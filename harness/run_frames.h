@@ -39,7 +39,7 @@ class RunSegment {
   oracles::RunFrame frame(int64_t k) const;           // k-th of the segment, whose spans live as long as it
 
   oracles::RunHeader header() const;  // arrays that are given once: of the first segment
-  // Of a later segment: it would be passed over, whatever it said.
+  // Refuses an array of a later segment that would be ignored.
   void refuse_what_is_given_once() const;
   // Empty where this segment does not give them again.
   std::optional<oracles::RunCoupling> coupling() const;

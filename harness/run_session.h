@@ -48,9 +48,9 @@ class RunSession {
   // that a folder that cannot be written to is known before anything runs.
   RunSession(RunInput input, Observers wanted, Backend& backend, oracles::MakeBackend make);
 
-  // All frames, or those until it is asked to stop; `on_frame` is told the end of each. Of a run that was stopped
-  // errors that take runs of their own are not measured. Throws InputError if a comparison is wanted of a backend that
-  // runs several stages in one piece.
+  // Runs all frames, or those until a stop is asked; calls `on_frame` at the end of each. In a stopped run, errors that
+  // need further runs are not measured. Throws InputError for a comparison with a backend that runs several stages in
+  // one piece.
   void run(const std::function<void(const FrameResult&)>& on_frame, const StopAsked& stop_asked = {});
   bool is_stopped() const { return is_stopped_; }
 
@@ -65,7 +65,7 @@ class RunSession {
   const std::vector<Verdict>& broken_contracts() const { return broken_; }
   // Observed stages that the backend cannot run.
   std::vector<std::string> left_to_reference() const { return stages_.left(); }
-  // Of all that was judged, compared and measured.
+  // Whether all verdicts, comparisons and measurements hold.
   bool holds() const;
 
  private:

@@ -51,8 +51,8 @@ class SceneJudge {
   // Notes for the reader of the verdicts, one sentence each: a scene without expectations, and properties that were not
   // judged or not promised.
   std::vector<std::string> notes() const;
-  // The same but for those on promises and on stages that were left to the reference, of which unpromised(),
-  // left_to_reference() and not_its_own() say more.
+  // The same without the notes on promises and on stages that the reference ran; unpromised(), left_to_reference() and
+  // not_its_own() have the details.
   std::vector<std::string> notes_beside_lists() const;
 
  private:

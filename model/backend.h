@@ -36,7 +36,7 @@ class Backend {
   // "reference", "host", "gpu", or the name of a plugin.
   virtual std::string name() const = 0;
 
-  // Of its arithmetic. Its states say so too (State::precision).
+  // Precision of the backend's arithmetic, also that of its states (State::precision).
   virtual Precision precision() const { return Precision::binary64; }
 
   // Which contiguous runs of stages the backend can execute: every one, whole frames only, or a single stage. The

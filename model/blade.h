@@ -17,8 +17,8 @@ struct Blade {
   friend bool operator==(const Blade&, const Blade&) = default;
 };
 
-// Where the mid-surface is: { edge + u·along + w·back : |u| <= length / 2, 0 <= w <= depth }. Its positive normal
-// is along × back.
+// The mid-surface is { edge + u·along + w·back : |u| <= length / 2, 0 <= w <= depth }. Its positive normal is along ×
+// back.
 struct BladePose {
   Vec3 edge;               // middle of the cutting edge, body frame [m]
   Vec3 along = {1, 0, 0};  // unit, direction of the cutting edge

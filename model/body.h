@@ -63,11 +63,12 @@ struct Body {
     const auto i = static_cast<std::size_t>(particle);
     return on_grid() ? grid.rest_position(node[i]) : rest[i];
   }
-  // Of the edge between two neighbours [m].
+  // Length of the edge between two neighbours at rest [m].
   double rest_length(int32_t a, int32_t b) const {
     return on_grid() ? grid.spacing : norm(rest_position(a) - rest_position(b));
   }
-  // How far from `particle` the surface crosses that edge, as a fraction of h; 0: not known, or the edge stays inside.
+  // Distance from `particle` to the surface along that edge, as a fraction of h; 0: not known, or the edge stays
+  // inside.
   double crossing(int32_t particle, int direction) const {
     if (surface_crossing.empty()) return 0;
     return surface_crossing[6 * static_cast<std::size_t>(particle) + static_cast<std::size_t>(direction)] /

@@ -123,7 +123,7 @@ inline void know_every_member(const State& state) {
 }
 }  // namespace fields_detail
 
-// How many entries a field of an index space has in a well-formed state; of IndexSpace::state this says nothing.
+// Number of entries of a field of an index space in a well-formed state; without a meaning for IndexSpace::state.
 inline int64_t count_of(IndexSpace space, const State& state) {
   const auto clusters = std::ssize(state.clusters.number);
   // In the order of IndexSpace.

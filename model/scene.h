@@ -122,7 +122,7 @@ struct Expectations {
   friend bool operator==(const Expectations&, const Expectations&) = default;
 };
 
-// Of the format: a reader refuses any other.
+// Version of the format: a reader refuses any other.
 inline constexpr int32_t kSceneVersion = 5;
 
 // How often detection runs. substep: each frame of S substeps is laid out as S frames of one substep, in all of which

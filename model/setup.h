@@ -128,7 +128,7 @@ struct Setup {
   int64_t frame_count() const { return static_cast<int64_t>(substep_length.size()); }
 };
 
-// How far from its owner a skin vertex lies on a grid edge that no cut has opened, as a fraction of h (method.md §8).
+// Distance of a skin vertex from its owner on a grid edge that no cut has opened, as a fraction of h (method.md §8).
 inline double uncut_reach(const Setup& setup, int32_t owner, int direction) {
   const double crossing = setup.body.crossing(owner, direction);
   return crossing > 0 ? crossing : setup.skin.alpha;

@@ -33,7 +33,7 @@ struct SetupField {
   std::string_view name;   // within the group: "solver"
   SetupSpace space;
   std::string_view unit = "1";  // "1" for counts, flags, names and ratios
-  // Of a number, of each component of a vector, of each entry of a list. All of them are finite.
+  // Bounds of a number, of each component of a vector, or of each entry of a list. All numbers are finite.
   double least = kAnyNumber;
   bool above = false;  // `least` itself is not allowed
 };

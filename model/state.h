@@ -26,8 +26,8 @@ struct State {
   // The coarsest arithmetic in which any part of this was computed: a backend makes it coarser where its own is, and
   // never finer.
   Precision precision = Precision::binary64;
-  // By how much each absolute place may be off beyond that, because it was stored as an absolute coordinate [m]. Our
-  // backends keep displacements, and have 0; a state from a file has the rounding of its greatest coordinate.
+  // Further error of each absolute place, because it was stored as an absolute coordinate [m]. Our backends keep
+  // displacements, and have 0; a state from a file has the rounding of its greatest coordinate.
   double place_rounding = 0;
 
   friend bool operator==(const State&, const State&) = default;

@@ -1,4 +1,4 @@
-// How long work is asked to stop, and how it ends.
+// Requests to stop long work, and its end.
 #pragma once
 #include <functional>
 

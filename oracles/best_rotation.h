@@ -7,7 +7,7 @@
 
 namespace cutproof::oracles {
 
-// Of A scaled by a power of two such that its greatest entry lies in [1/2, 1).
+// Results for A scaled by a power of two such that its greatest entry lies in [1/2, 1).
 struct BestRotation {
   std::array<long double, 9> a;  // A scaled; row-major
   long double value = 0;         // σ1 + σ2 + s σ3, s the sign of det A

@@ -1,4 +1,5 @@
-// Where the blade is within one of its moves (model/blade.h), and where a point is beside it. Internal to oracles/.
+// The pose of the blade within one of its moves (model/blade.h), and a point's coordinates relative to it. Internal to
+// oracles/.
 #pragma once
 #include <algorithm>
 #include <cmath>

@@ -40,7 +40,7 @@ void check_skin_reach(const StageRun& run, Verdict& verdict);
 void check_momentum(const StageRun& run, Verdict& verdict);
 void check_component_momentum(const StageRun& run, Verdict& verdict);
 void check_motion(const StageRun& run, Verdict& verdict);
-// Of oracles/step_model/step_again.cpp, which is asked for more than the verdict too.
+// From oracles/step_model/step_again.cpp, which also has other callers.
 inline constexpr std::string_view kAdmissibleStep = "admissible step", kNoStep = "nothing is alive",
                                   kAdmissibleStepSource = "method.md §3; tolerances.md, The step again";
 void check_admissible_step(const StageRun& run, Verdict& verdict);

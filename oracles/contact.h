@@ -1,5 +1,5 @@
-// Where blade and walls let one particle be within one substep (method.md §3), written a second time: no line is shared
-// with a backend. Internal to oracles/.
+// Places that blade and walls allow one particle within one substep (method.md §3), implemented independently of any
+// backend. Internal to oracles/.
 #pragma once
 #include <limits>
 #include <vector>
@@ -34,8 +34,8 @@ class Contact {
   // plus that of the edge from the origin, or the greatest offset of a wall if that is more.
   double rounds(Vec3 x) const;
 
-  // By how much x is inside of what a particle of this side may not enter [m]; not above 0: it may be there. Beside a
-  // border of the plate that is one or the other, as far as a place within `near` of x can tell.
+  // Depth of x in the places forbidden for a particle of this side [m]; not above 0: x is allowed. Beside a border of
+  // the plate, `least` and `most` are those of all places within `near` of x.
   struct Depth {
     double least, most;
   };

@@ -50,8 +50,8 @@ inline constexpr StateOracle isolation{core_properties, "isolation"};
 inline constexpr StateOracle edge_cover{core_properties, "edge cover"};    // I4, where state.edge_covered promises it
 inline constexpr StateOracle rest_frames{core_properties, "rest frames"};  // T_c and M_c of every cluster
 inline constexpr StateOracle rotation_quality{core_properties, "rotation"};  // ‖RᵀR − I‖ and det > 0 of every cluster
-// The rotation of each cluster is within half a right angle of the best one for where its particles are; or is the best
-// one. Of a state that comes by itself (`lone_state_properties`).
+// The rotation of each cluster is within half a right angle of the best one for its particles' positions; or is the
+// best one. For a state without its run (`lone_state_properties`).
 inline constexpr StateOracle rotation_fits{lone_state_properties, "rotation match"};
 inline constexpr StateOracle rotation_is_best{lone_state_properties, "best rotation"};
 // Small clusters that could still merge (method.md §6, maximal): none, given that nothing else is owed.
@@ -83,9 +83,9 @@ inline constexpr StageOracle component_momentum{"component momentum", Stage::ste
 // Vacuous where none of these can be asked: a blade that is down, friction or a grip may push to any side.
 inline constexpr StageOracle motion{"motion", Stage::step};
 // The step, computed again from the state before it, by an oracle that shares no line with any backend: where every
-// particle, velocity, rotation and the impulse may be, given the rounding of the state's precision. Where a decision
-// hangs on rounding, all that is coupled with it has wider bounds. `measured` and `bound` as above; `undecided` counts
-// what no sharp bound was asked of.
+// particle, velocity, rotation and the impulse may be, given the rounding of the state's precision. Where a decision is
+// inconclusive, all coupled quantities have wider bounds. `measured` and `bound` as above; `undecided` counts what no
+// sharp bound was asked of.
 inline constexpr StageOracle admissible_step{"admissible step", Stage::step, motion_properties};
 inline constexpr StageOracle detection{"detection",
                                        Stage::detect};  // removed <=> as the criterion says, outside the band

@@ -1,5 +1,5 @@
-// Partitions of the alive particles, for oracles, reports and expectations. Of a state that is not well formed they are
-// empty.
+// Partitions of the alive particles, for oracles, reports and expectations. A state that is not well formed has empty
+// partitions.
 #pragma once
 #include <cstdint>
 #include <vector>

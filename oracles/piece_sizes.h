@@ -1,4 +1,4 @@
-// How large the pieces of a partition are, in words: for witnesses.
+// Sizes of the pieces of a partition, in words, for witnesses.
 #pragma once
 #include <string>
 

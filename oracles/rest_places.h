@@ -1,4 +1,4 @@
-// Where particles rest in units of h, and whether they lie on one line there. Internal to oracles/.
+// Rest positions of particles in units of h, and whether they lie on one line. Internal to oracles/.
 #pragma once
 #include <cstdint>
 #include <span>

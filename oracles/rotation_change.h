@@ -1,4 +1,4 @@
-// How a rotation that a cluster should have kept differs, in words. Internal to oracles/.
+// The difference of a rotation that a cluster should have kept, in words. Internal to oracles/.
 #pragma once
 #include <algorithm>
 #include <cmath>

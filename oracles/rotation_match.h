@@ -13,7 +13,7 @@ namespace cutproof::oracles {
 
 struct WeightedRest;  // oracles/shape_sums.h
 
-// How far a rotation may be from the best one for the places that are judged.
+// Greatest distance of a rotation from the best one for the judged places.
 enum class Lag {
   none,   // nothing but rounding
   a_step  // half a right angle: it was taken before a step, or an iteration, that moved the particles

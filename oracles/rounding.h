@@ -47,8 +47,8 @@ inline constexpr double kDeviations = 8;
 // the substep, to a velocity; more than that is not there to be rounded (tolerances.md, Runs).
 inline constexpr double kStableForces = 4;
 
-// How many times the noise that was seen another run of the same simulator may have, at most (tolerances.md, A kick in
-// a noisy simulator).
+// Greatest noise of another run of the same simulator, as a multiple of the measured noise (tolerances.md, A kick in a
+// noisy simulator).
 inline constexpr double kNoiseFactor = 64;
 
 // Of many comparisons the one that comes nearest to its bound, or goes farthest beyond. NaN is beyond.

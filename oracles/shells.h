@@ -18,15 +18,15 @@ struct Shells {
 // `points`: where the vertices are [v]. Requires triangles to name vertices that exist.
 Shells shells_of(const Skin& skin, const std::vector<Vec3>& points);
 
-// Where a vertex is at rest [m].
+// Rest position of a vertex [m].
 inline Vec3 vertex_at_rest(const Setup& setup, const Skin& skin, std::size_t v) {
   const auto& d = kDirections[skin.direction[v]];
   const double reach = skin.reach[v] * setup.body.grid.spacing;
   return setup.body.rest_position(skin.owner[v]) + reach * Vec3{1.0 * d[0], 1.0 * d[1], 1.0 * d[2]};
 }
 
-// Where the clusters of their owners put the vertices (method.md §8), and how far from there a right answer may be, by
-// rounding (tolerances.md, One skin vertex) [m]. Requires each owner to lie in a cluster.
+// Places of vertices by the clusters of their owners (method.md §8), and the rounding of a correct answer
+// (tolerances.md, One skin vertex) [m]. Requires each owner to lie in a cluster.
 struct VertexPlace {
   Vec3 place;
   double bound = 0;

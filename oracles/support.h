@@ -171,8 +171,8 @@ inline Verdict not_judged(std::string_view property, const Verdict& form) {
 // The partitions themselves, of a well-formed state.
 Partition components_of_graph(const TissueGraph& graph);
 Partition components_of_coupling(const TissueGraph& graph, const Clusters& clusters);
-// How many different pairs of labels occur among particles. Equal to a.count exactly if a refines b, and to b.count
-// exactly if b refines a.
+// Number of different pairs of labels among particles. Equal to a.count exactly if a refines b, and to b.count exactly
+// if b refines a.
 int64_t distinct_pairs(const Partition& a, const Partition& b);
 
 struct Edge {

@@ -1,4 +1,4 @@
-// How long judging took.
+// The time of judging.
 #pragma once
 #include <chrono>
 

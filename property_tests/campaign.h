@@ -60,7 +60,7 @@ struct Campaign {
   harness::StagesRun stages;
   std::vector<Violation> violations;  // by index; without keep_going the first alone
   double seconds = 0;                 // wall time
-  // Of all threads together [s]; `reference`: its stages, for comparison.
+  // Times of all threads together [s]; `reference`: stages of the reference, for comparison.
   double generating = 0, running = 0, reference = 0, judging = 0;
 };
 

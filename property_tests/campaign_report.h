@@ -22,7 +22,7 @@ inline constexpr int64_t kMostShards = 1'000'000;
 // its end, is listed in `missing_shards`, and `complete` is false. Throws InputError, naming the file, for anything
 // that is not the result of a shard of one campaign, each once.
 nlohmann::json merge_shards(const std::vector<std::string>& files);
-// Of a merged document, as job arrays write it: "3,7-12"; empty: none is missing.
+// Missing shards of a merged document, as job arrays write them: "3,7-12"; empty: none.
 std::string missing_shards(const nlohmann::json& document);
 
 // Throws InputError, naming `file`, if something is missing, or of another kind, that a conclusion reads.

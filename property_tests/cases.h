@@ -86,7 +86,7 @@ struct Instance {
   State state;
 };
 Instance instance_of(const Case& c);
-// Its setup alone. A stroke that is appended leaves the frames of those before it as they are.
+// The setup of a case alone. An appended stroke does not change the frames of earlier strokes.
 Setup setup_of(const Case& c);
 
 void without_blade(Setup& setup);

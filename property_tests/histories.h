@@ -44,7 +44,7 @@ using Command = std::variant<RunStages, Cut, Kick, SaveAndLoad>;
 std::string to_json(const Command& command);
 std::vector<Command> commands_from_json(const std::string& list);
 
-// Where a history is: nothing more is needed to say which command may come next.
+// The state of a history that decides which command may come next.
 struct Position {
   int64_t frame = 0;
   Stage next = Stage::step;
@@ -125,7 +125,7 @@ class History {
   std::unique_ptr<harness::FrameRunner> staged_run_, whole_run_;
   State state_;  // of staged_
   Stage next_ = Stage::step;
-  int32_t given_strokes_ = 0;  // with the blade down, of the case as it was drawn
+  int32_t given_strokes_ = 0;  // with the blade down, of the case as drawn
   bool has_expanded_ = false;
   bool has_kicked_ = false;
   bool unloaded_beside_ = false;  // whole_ went on as it was when staged_ was last loaded

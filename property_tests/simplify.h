@@ -19,7 +19,7 @@ struct Simplified {
 Simplified simplify(const Violation& violation, const harness::BackendChoice& choice, double seconds,
                     const StopAsked& stop_asked = {});
 
-// The case as it was drawn, without running it.
+// The case as drawn, without running it.
 Simplified as_drawn(const Violation& violation, const harness::BackendChoice& choice);
 
 // The backend with which a counterexample is run again: under its schedule, if it has one and the backend takes one.

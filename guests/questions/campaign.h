@@ -21,7 +21,7 @@ inline constexpr const char* kAnswersProperty = "answers";
 struct KernelCampaignOptions {
   uint64_t seed = 1;
   int64_t cases = 1000;  // matrices, or bodies; at least one question of each kind; large ones beside
-  // Of large questions, ascending: one of each large kind in each size.
+  // Sizes of large questions, ascending: one question of each large kind in each size.
   std::vector<int64_t> sizes = {};
   double time_limit = 10;  // [s] for an answer; a larger question is not asked if its answer would take longer, should
                            // the time of an answer grow with the square of the size

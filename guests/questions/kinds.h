@@ -33,7 +33,7 @@ class Random {
   std::mt19937_64 engine_;
 };
 
-// Of a question about one body.
+// For a question about one body.
 int64_t one_body(const Question& question);
 std::string size_of_body(const Question& question);
 

@@ -61,7 +61,7 @@ struct OperationDescription {
   std::vector<Verdict> (*judge)(const Question& question, const Arrays& answers, Precision precision);
   // The defect of a question from a file, or "": sizes and indices. Types are checked already.
   std::string (*problem)(const Question& question);
-  // Questions that are each simpler, the most drastic first. Null for those that are asked of files alone.
+  // Simpler questions, the most drastic first. Null for operations of files alone.
   std::vector<Question> (*simpler)(const Question& question);
   // Kinds of cases, in the order in which they are drawn.
   std::vector<std::string> (*kinds)();
@@ -70,12 +70,12 @@ struct OperationDescription {
   std::vector<std::string> (*large_kinds)() = nullptr;
   std::span<const int64_t> sizes = {};
   Question (*draw_large)(uint64_t seed, int64_t kind, int64_t size, Precision precision) = nullptr;
-  // Of a whole simulator, whose promises are those of runs. Null for all others. `draw` within what a plugin states;
-  // throws InputError for unknown words.
+  // Questions to a whole simulator, whose promises are those of runs. Null for all other operations. `draw` within what
+  // a plugin states; throws InputError for unknown words.
   Question (*draw_for)(uint64_t seed, int64_t index, const PluginInfo& plugin) = nullptr;
   // The property whose verdict is not vacuous if a question matches its kind.
   std::string_view as_drawn = {};
-  // Where two answers to a question part first.
+  // The first difference of two answers to a question.
   std::string (*difference)(const Question& question, const Arrays& one, const Arrays& other) = nullptr;
   // Verdicts on further questions beside an answered one.
   std::vector<Verdict> (*judge_beside)(const Question& question, const Arrays& answers, Precision precision,

@@ -20,7 +20,7 @@ struct Limits {
   double cut_resolution = 0;                                     // [h]
   double one_blade = 0, cells = 0, diagonals = 0, no_grips = 0;  // 1: the word is given
 };
-// Of its words. Throws InputError for one that there is not.
+// Limits from their words. Throws InputError for an unknown word.
 Limits limits_of(const std::string& words, const std::string& plugin);
 
 // A plugin's promises of its runs and of related runs. Their bits are in a question.
@@ -57,7 +57,7 @@ Array as_it_is_given(Array array, Precision precision);
 std::vector<Vec3> vectors_of(const Array& array);
 std::vector<double> numbers_of(const std::vector<Vec3>& vectors);
 
-// Of the places at rest along a direction.
+// Extent of the rest positions along a direction.
 struct Range {
   double low = 0, high = 0;
 };

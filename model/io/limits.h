@@ -12,7 +12,7 @@ namespace cutproof::io {
 inline constexpr uint64_t kMiB = uint64_t{1} << 20;
 inline constexpr uint64_t kGiB = uint64_t{1} << 30;
 
-// Of a JSON file. `values` counts objects, lists, texts, numbers and words; names of fields count as values do.
+// Limits of a JSON file. `values` counts objects, lists, texts, numbers and words; names of fields count as values do.
 struct JsonLimits {
   std::string_view what;  // as a sentence begins
   uint64_t bytes;
@@ -25,7 +25,7 @@ inline constexpr JsonLimits kCampaignLimits = {"A result of fuzz", 64 * kMiB, 64
 inline constexpr JsonLimits kResultsLimits = {"A result for a report page", 64 * kMiB, 64, 4'000'000};
 inline constexpr JsonLimits kQuestionLimits = {"A question to a kernel", 32 * kMiB, 64, 2'000'000};
 
-// Of a scene.
+// Limits of a scene.
 inline constexpr std::size_t kMostNameBytes = 200;
 inline constexpr std::size_t kMostDescriptionBytes = 10'000;
 inline constexpr std::size_t kMostPathBytes = 4096;
@@ -36,30 +36,30 @@ inline constexpr std::size_t kMostWalls = 100;
 inline constexpr std::size_t kMostGrips = 100;
 inline constexpr uint64_t kMostGripSubsteps = 20'000'000;  // a grip has 25 bytes for each substep
 
-// Of a counterexample.
+// Limits of a counterexample.
 inline constexpr std::size_t kMostCaseNodes = 100'000;
 inline constexpr int64_t kMostCaseCells = 10'000'000;  // of the box around them
 inline constexpr std::size_t kMostCommands = 10'000;
 inline constexpr std::size_t kMostDecisions = 10'000'000;  // of a schedule
 
-// Of a result of fuzz.
+// Limits of a result of fuzz.
 inline constexpr std::size_t kMostProperties = 1000;
 
-// Of a mesh.
+// Limits of a mesh.
 inline constexpr uint64_t kMostMeshBytes = 256 * kMiB;
 inline constexpr std::size_t kMostMeshElements = 2'000'000;  // faces, and vertices
 
-// Of a file of arrays.
+// Limits of a file of arrays.
 inline constexpr uint64_t kMostArrayBytes = 4 * kGiB;  // of all arrays together, as they lie in memory
 inline constexpr std::size_t kMostArrays = 64;
 inline constexpr std::size_t kMostArrayAxes = 8;
 inline constexpr std::size_t kMostTextBytes = std::size_t{1} << 15;
 
-// Of a run of another simulator.
+// Limits of a run of another simulator.
 inline constexpr std::size_t kMostSegments = 1'000'000;
 inline constexpr int64_t kMostPatches = 10'000;  // of a blade's sweep in a frame
 
-// Of a recording.
+// Limits of a recording.
 inline constexpr int64_t kMostSnapshots = 1'000'000;
 
 // Compressed data become larger when read. Up to this size, any ratio is accepted; beyond it, data may be this many

@@ -17,7 +17,7 @@ namespace cutproof::io {
 void write_setup(hid_t file, const Setup& setup);
 Setup read_setup(hid_t file, hdf5::InflationBudget& budget);
 
-// Of all that a run begins with but the state as loaded, which is to be added.
+// Digest of the input of a run without the loaded state, which the caller adds.
 Digest digest_of_beginning(const Setup& setup, std::string_view scene_json,
                            const std::array<bool, 6>& left_to_reference, std::optional<int64_t> frames_asked);
 

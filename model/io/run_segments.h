@@ -19,7 +19,8 @@ class RunSegments {
   // Whether a file of arrays is a run by itself: `positions` have three axes, and it is no kick.
   static bool is_segment(const ArrayFile& contents);
 
-  // Of any kind. Throws what read_array_file and RecordingReader throw, and InputError if there is no segment.
+  // Segments of any kind. Throws the exceptions of read_array_file and RecordingReader, and InputError if there is no
+  // segment.
   static RunSegments of(const std::string& path);
   // Requires has_segments(path). Throws InputError if there is no segment, or if one between others is missing.
   explicit RunSegments(std::string path);

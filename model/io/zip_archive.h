@@ -30,7 +30,7 @@ struct ZipEntry {
 // All of it throws DamagedArchive.
 class ZipReader {
  public:
-  // Of a regular file. Reads the archive's end alone.
+  // The archive of a regular file. Reads the archive's end alone.
   explicit ZipReader(const std::string& path);
   ~ZipReader();
   ZipReader(const ZipReader&) = delete;

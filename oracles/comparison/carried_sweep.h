@@ -31,7 +31,7 @@ class CarriedSweep {
   // has no surface, and well_formed fails.
   void add(const State& before, const State& after);
 
-  // Of the frames that were added; body frame at rest [m].
+  // The surface of the added frames; body frame at rest [m].
   const std::vector<std::array<Vec3, 3>>& surface() const { return surface_; }
 
  private:

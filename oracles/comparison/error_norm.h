@@ -1,4 +1,4 @@
-// How large the errors of many things of one kind are: the one figure for every distance in the project.
+// Norm of many errors of one kind, used for every distance in the project.
 #pragma once
 #include <cmath>
 #include <cstdint>

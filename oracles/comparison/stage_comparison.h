@@ -99,8 +99,8 @@ class StageComparison {
   StageComparison(const Setup& setup, ReferenceStages reference);
 
   // `before` and `after`: the backend's states around the stage of frame before.frame; `before` well formed.
-  // `launched`: whether the backend ran the stage. Of an `after` that is not well formed nothing is compared: that is
-  // its difference.
+  // `launched`: whether the backend ran the stage. An `after` that is not well formed is itself the difference, and
+  // nothing else is compared.
   StageDifference compare(Stage stage, const State& before, const State& after, bool launched);
 
  private:

@@ -1,6 +1,5 @@
-// Where a body is at the end of every frame of a scene, and how far two runs of one scene are apart. Runs may divide
-// frames differently and have different clusters, so nothing but particles is compared (measure_and_tune.md,
-// Tuning).
+// Positions of a body at the end of every frame of a scene, and distances of two runs of one scene. Runs may divide
+// frames differently and have different clusters, so nothing but particles is compared (measure_and_tune.md, Tuning).
 #pragma once
 #include <cstdint>
 #include <vector>

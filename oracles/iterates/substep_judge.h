@@ -51,7 +51,7 @@ class SubstepJudge {
   // The state after iteration `k` = 0, 1, …, given those after `k` and, where k > 0, `k` − 1 iterations.
   void iteration(int32_t k, const State* earlier, const State& now, const State& next);
 
-  // Of all that was compared that which comes nearest to its bound, or goes farthest beyond.
+  // The comparison that comes nearest to its bound, or goes farthest beyond.
   const IterateFinding& worst() const { return worst_; }
   int64_t checked() const { return checked_; }
   // Particles of which turns of blade and walls let rounding decide, clusters whose rotation is no more than rounding.

@@ -26,7 +26,7 @@ constexpr const char* name_of(StepPart part) {
 
 struct AdmissibleStep {
   StepOutcome outcome;  // of exact arithmetic
-  // Of the comparison that comes nearest to its bound, or goes farthest beyond.
+  // The comparison that comes nearest to its bound, or goes farthest beyond.
   StepPart part = StepPart::position;
   int32_t where = -1;   // particle; of a rotation, index of the cluster; of the impulse -1
   double measured = 0;  // [h]; velocities times dt, rotations by where they put the farthest member, impulses times dt
