@@ -32,9 +32,9 @@ struct Judging {
 // The case and the annotation of a requirement that is no property: enough was judged, completely.
 inline constexpr const char* kEnoughJudged = "enough was judged";
 
-// A case for each property and stage, or each property where there are no stages, in the order in which they first
-// appear, with the time that its verdicts took: failed with its first failing verdict, skipped where no verdict of it
-// looked at anything. `is_expected`: a failure that the scene asks for, which passes.
+// A case for each property and stage, or each property where there are no stages, in the order of their first verdicts,
+// with their time. A case fails with its first failing verdict. A case is skipped if all its verdicts are vacuous.
+// `is_expected`: a failure that the scene asks for, which passes.
 std::vector<io::JunitCase> cases_of(const std::vector<Verdict>& verdicts, const Judging& judging,
                                     const std::function<bool(const Verdict&)>& is_expected = {});
 // The same for all verdicts of a run. Unpromised properties are skipped, with the number of states in which they would

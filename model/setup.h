@@ -86,8 +86,8 @@ struct Wall {
 // must not decide for a particle that lies exactly on a wall.
 inline constexpr double kTouchMargin = 0x1p-10;
 
-// Where blade and walls are projected in turn, a place is refused if it is worse than the present one by more than this
-// many roundings of the compared distance and of the present place (method.md §3).
+// Where blade and walls are projected in turn, a worse place than the present one is refused (method.md §3). Worse
+// means by more than this many roundings of the compared distance and of the present place.
 inline constexpr double kRefusalRoundings = 64;
 
 // Whether two walls face each other with no room between them: then no place is allowed.

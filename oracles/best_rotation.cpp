@@ -39,10 +39,10 @@ BestRotation best_rotation(const Mat3& given) {
     best.v[static_cast<std::size_t>(k)] = static_cast<double>(v(k, 0));
   }
   best.r = to_mat3((u * Vector(1, 1, sign).asDiagonal() * v.transpose()).cast<double>());
-  // With U' and V' the orthogonal matrices nearest to U and V (at a distance of at most ‖UᵀU - I‖), A differs from
-  // U' Σ V'ᵀ, whose value is the one above, by no more than the residual and what U - U' and V - V' make of Σ. A value
-  // changes by at most √3 times the Frobenius norm of a change of A. Each product of two 3 × 3 matrices here is off by
-  // 6 units of its entries, which are below 3.
+  // With U' and V' the orthogonal matrices nearest to U and V (at a distance of at most ‖UᵀU - I‖), A differs from U' Σ
+  // V'ᵀ, whose value is the one above, by no more than the residual and the products of U - U' and V - V' with Σ. A
+  // value changes by at most √3 times the Frobenius norm of a change of A. Each product of two 3 × 3 matrices here is
+  // off by 6 units of its entries, which are below 3.
   const Real loss = (u.transpose() * u - Matrix::Identity()).norm() + (v.transpose() * v - Matrix::Identity()).norm();
   const Real residual = (a - u * sigma.asDiagonal() * v.transpose()).norm();
   const Real unit = std::numeric_limits<Real>::epsilon() / 2;

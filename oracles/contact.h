@@ -30,8 +30,8 @@ class Contact {
   // On which side of it a particle ends, +1 or -1; 0 where it does not end over the plate, by `rim` at least [m], or
   // ends less than half a clearance from it.
   int side_of_end(Vec3 x, double rim) const;
-  // What arithmetic rounds on the way to a contact at x, in units of u [m]: 6 times the distance from the blade's edge
-  // plus that of the edge from the origin, or the greatest offset of a wall if that is more.
+  // Rounding of a contact at x, in units of u [m]. It is 6 times the distance from the blade's edge plus that of the
+  // edge from the origin, or the greatest offset of a wall if that is more.
   double rounds(Vec3 x) const;
 
   // Depth of x in the places forbidden for a particle of this side [m]; not above 0: x is allowed. Beside a border of

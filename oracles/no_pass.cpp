@@ -11,8 +11,8 @@ namespace cutproof::oracles {
 namespace {
 
 // Whether the closed segment meets the closed rectangle |u| <= length / 2, 0 <= w <= depth, n = 0. No band is needed:
-// both ends of an edge keep the distance ρ from the rectangle and an edge of G is shorter than 2ρ / 1.001, so what
-// obeys the lemma misses the rectangle by far more than rounding.
+// both ends of an edge keep the distance ρ from the rectangle, and an edge of G is shorter than 2ρ / 1.001. So an edge
+// that obeys the lemma misses the rectangle by far more than rounding.
 bool crosses(const Blade& blade, Local p, Local q) {
   if ((p.n > 0 && q.n > 0) || (p.n < 0 && q.n < 0)) return false;
   double low = 0, high = 1;  // the part of the segment that lies in the rectangle's plane and slabs

@@ -34,8 +34,8 @@ constexpr long double kMeasurable = 1e15L;
 // in second order, because Σ w (X - T) is zero. So F is off by (N + 8) u (S1 + (1 + σ) S2) / λ, λ the least eigenvalue
 // of A0 that is not zero. Twice that covers eigenvalues found by some sweeps of rotations in the same precision, and so
 // does 64 u σ for those of FᵀF, the root, and the threshold as it is stored. Absolute coordinates are off by p at rest,
-// and by as much as their means are: that puts A off by p Σ w |x - t| and A0 by 2 p Σ w |X - T|, and both by M e², with
-// e what rounds in a mean.
+// and by the rounding of their means. That puts A off by p Σ w |x - t| and A0 by 2 p Σ w |X - T|, and both by M e²,
+// with e the rounding of a mean.
 constexpr long double kTerms = 8, kSweeps = 64;
 
 struct ClusterStretch {

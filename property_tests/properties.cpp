@@ -433,8 +433,8 @@ TEST(Paths, OfTheDeviceGiveTheBitsOfTheHostAloneAndInALoad) {
   }
   if (paths.empty()) GTEST_SKIP() << "there is no device";
   ASSERT_GE(paths.size(), 2u);
-  // All beside the host's, which are the same operations in the same order: a product and a sum that a device rounds
-  // once instead of twice are found, as is whatever else is wrong by no more than rounding.
+  // Compares all results with the host's, which come from the same operations in the same order. That finds a product
+  // and a sum that a device rounds once instead of twice, and other errors of the size of rounding.
   harness::BackendChoice host;
   host.name = harness::kHostName;
   paths.emplace(paths.begin(), host.name, harness::make_backend(host));

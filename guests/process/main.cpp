@@ -449,9 +449,9 @@ void answer(wire::Reply& reply) {
 
 // --- Start -----------------------------------------------------------------------------------------------------------
 
-// A plugin that hangs does not outlive its host. (The signal that Linux sends when a parent dies comes when the thread
-// ends that started the process, and campaigns hand guests from thread to thread.) Who waits for a request sees the end
-// of the channel itself, and takes its instances apart meanwhile.
+// A plugin that hangs does not outlive its host. (Linux sends its signal of a parent's death when the thread ends that
+// started the process, but campaigns hand guests from thread to thread.) A guest that waits for a request sees the end
+// of the channel itself, and destroys its instances then.
 void end_with_host() {
   std::thread([] {
     pollfd hung_up = {channel, 0, 0};

@@ -27,8 +27,8 @@ struct ArrayFile {
 // Null if there is none of that name.
 const std::string* find_text(const ArrayFile& contents, std::string_view name);
 
-// Whether this path is to be read as a file of arrays, not as a recording: its name ends in ".npz", or there is a file
-// of exactly this name that is no part of a recording, while a recording of that name is not there.
+// Whether this path is to be read as a file of arrays, not as a recording. That is so if its name ends in ".npz". It is
+// also so if a file of exactly this name exists that is no part of a recording, and no recording of that name.
 bool is_array_file(const std::string& path);
 
 // NPZ or HDF5, told apart by how the file begins. Truth values, int8 and uint8 become u8; other integers i32 where

@@ -470,8 +470,8 @@ herr_t see_attribute(hid_t, const char* name, const H5A_info_t*, void* met) {
 
 }  // namespace
 
-// In the order in which they lie in the file, and sorted here: HDF5 1.10 makes a table to sort them, and frees what it
-// has not yet filled in of that if the group is damaged.
+// In the order of the file, and sorted here: HDF5 1.10 sorts by a table, of which it frees unset entries if the group
+// is damaged.
 std::vector<std::string> names_in(hid_t group, std::size_t most) {
   require_memory();
   Met met{most, {}};

@@ -148,8 +148,9 @@ class Table {
   Table() = default;
   // `expected_rows`: how many will be written, or 0 for a table that grows.
   static Table create(hid_t parent, const std::string& name, const Layout& row, int64_t expected_rows = 0);
-  // Throws Error if it is missing, or of another type or shape, or claims more rows than `file_bytes` can hold, or if
-  // its rows lie elsewhere: behind soft and external links, in other files, behind filters that are not HDF5's own.
+  // Throws Error if the table is missing, has another type or shape, or claims more rows than `file_bytes` can hold.
+  // Throws Error if its rows lie elsewhere: behind soft and external links, in other files, or behind filters that are
+  // not HDF5's own.
   static Table open(hid_t parent, const std::string& name, const Layout& row, uint64_t file_bytes);
   int64_t rows() const { return rows_; }
   int64_t append(std::span<const std::byte> rows);  // whole ones; returns the index of the first new row
@@ -183,9 +184,9 @@ enum class ValueKind { signed_integer, unsigned_integer, real, text };
 // A dataset or an attribute, opened.
 class Values {
  public:
-  // Throws Error if it is neither number nor text, has more than 8 axes, leads to other files (external storage,
-  // virtual datasets), has been through filters that are not HDF5's own, or claims more than `most_bytes`, or more than
-  // can be stored in what the file has of it.
+  // Throws Error if the dataset is neither number nor text, has more than 8 axes, leads to other files (external
+  // storage, virtual datasets), or uses filters that are not HDF5's own. Throws Error if it claims more than
+  // `most_bytes`, or more than its stored bytes can hold.
   static Values of_dataset(hid_t parent, const std::string& name, uint64_t most_bytes, uint64_t file_bytes);
   static Values of_attribute(hid_t object, const std::string& name, uint64_t most_bytes, uint64_t file_bytes);
   ValueKind kind() const { return kind_; }

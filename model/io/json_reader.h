@@ -8,9 +8,9 @@
 
 namespace cutproof::io {
 
-// Throws InputError, naming `file` (and line and column, or the field), for what is not valid JSON in UTF-8, goes
-// beyond the limits, names a field of one object twice (JSON libraries let that pass, and then one of the two is lost),
-// or has a number that is not finite. Limits are checked before the tree is made. `remedy`: the remedy if the file is
+// Throws InputError, naming `file` (and line and column, or the field), for text that is not valid JSON in UTF-8,
+// exceeds the limits, has a number that is not finite, or names a field of one object twice. (JSON libraries accept
+// such fields and lose one of the two.) Limits are checked before the tree is made. `remedy`: the remedy if the file is
 // not JSON at all, as a sentence.
 nlohmann::json parse_json(const std::string& text, const std::string& file, const JsonLimits& limits,
                           const std::string& remedy);

@@ -71,10 +71,11 @@ struct Recording {
 
 class RecordingReader {
  public:
-  // Throws InputError if the file is missing, cut off, not a recording, of another version, or inconsistent: sizes and
-  // rows that do not fit each other, a setup with particles out of range or NaN, files for ParaView that show another
-  // run than the index, …. What a snapshot's state contains is not judged, nor whether the setup is the scene's
-  // (fixtures/recorded_scene.h). The particles and skin files must be beside the index; the blade's is not needed.
+  // Throws InputError if the file is missing, cut off, not a recording, of another version, or inconsistent.
+  // Inconsistent are sizes and rows that do not fit each other, a setup with particles out of range or NaN, files for
+  // ParaView that show another run than the index, …. What a snapshot's state contains is not judged, nor whether the
+  // setup is the scene's (fixtures/recorded_scene.h). The particles and skin files must be beside the index; the
+  // blade's is not needed.
   explicit RecordingReader(const std::string& name);
   ~RecordingReader();
   const Recording& header() const;

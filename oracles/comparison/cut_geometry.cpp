@@ -20,9 +20,9 @@ namespace {
 
 // --- The ideal cut ---------------------------------------------------------------------------------------------------
 
-// Crossings of one line that are nearer to each other than this, at right angles to the cut, are one [h]: the blade
-// passes such a place twice, because it goes back or because pushed tissue springs back to it. Particles cannot resolve
-// cuts that lie nearer.
+// Crossings of one line that are nearer to each other than this, at right angles to the cut, count as one [h]. The
+// blade passes such a place twice, because it goes back or because pushed tissue springs back to it. Particles cannot
+// resolve cuts that lie nearer.
 constexpr double kSameCut = 0.5;
 
 void add_quad(std::vector<Triangle>& surface, Vec3 a, Vec3 b, Vec3 c, Vec3 d) {

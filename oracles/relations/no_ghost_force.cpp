@@ -12,8 +12,8 @@ namespace cutproof::oracles {
 
 namespace {
 
-// A piece below the size of debris that lies in the body from the beginning goes with the first removal anywhere, so a
-// kick that tears tissue would take it, and no force is at work (decisions.md, A kick drops no debris).
+// A piece below the size of debris that exists from the beginning is removed with the first removal anywhere. A kick
+// that tears tissue would remove it without a force (decisions.md, A kick drops no debris).
 Setup without_debris(Setup setup) {
   setup.split.debris = 0;
   return setup;

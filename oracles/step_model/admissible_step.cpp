@@ -28,8 +28,8 @@ constexpr double kNotShared = 0.125;
 // them a right answer may be.
 constexpr uint64_t kDisturbedRuns = 8, kMostDisturbedRuns = 48;
 constexpr double kBeyondRuns = 8;
-// Of bodies whose runs cost more than this [evaluations] several go at the same time, where there are processors for
-// them: at most as many as are always made, since each takes some hundred bytes for each particle.
+// Bodies whose runs cost more than this [evaluations] have several concurrent runs, if there are processors. There are
+// at most as many concurrent runs as are always made, because each takes some hundred bytes for each particle.
 constexpr int64_t kLongRun = 2'000'000;
 // Beyond this, the effect of a rounding is not linear [h].
 constexpr double kSmall = 1e-3;
@@ -316,8 +316,8 @@ class Judge {
     compare();
   }
 
-  // What a contact holds does not move at all until it slips or comes off, and the runs may just not have been that
-  // far: if those beside it may be off by more than it is held by, it is asked no more sharply than they are.
+  // A particle held by a contact does not move until it slips or comes off, and the disturbed runs may not have reached
+  // that point. If the bounds of its neighbours exceed its hold, it gets their bound.
   void let_go() {
     Bounds& b = bounds_;
     const auto widest = [&](const std::vector<double>& bound, int32_t c) {
