@@ -1,4 +1,4 @@
-// Campaigns as documents (json.md, fuzz): one for each shard, merged to one of the whole campaign, and its
+// Campaigns as documents (docs/reference/schemas/fuzz.json): one for each shard, merged to one of the whole campaign, and its
 // conclusion.
 #pragma once
 #include <nlohmann/json.hpp>
