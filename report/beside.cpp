@@ -16,7 +16,7 @@ namespace cutproof::report {
 uint8_t code_of(double distance) {
   if (distance == 0) return 0;
   if (!std::isfinite(distance)) return kIncomparable;
-  return static_cast<uint8_t>(std::clamp(std::lround(4 * (std::log10(distance) + 12)), 1L, 250L));
+  return static_cast<uint8_t>(std::clamp(std::lround(4 * (std::log10(distance) + 18)), 1L, 250L));
 }
 
 Apart apart_of(const State& one, const State& other, double spacing) {

@@ -30,7 +30,7 @@ struct Apart {
 // States of the same body; they may be as wrong as they like. What is not finite is infinitely far apart.
 Apart apart_of(const State& one, const State& other, double spacing);
 
-// A distance [h] as a byte: 0 for none at all, else four to a decade from 1e-12 h on; kIncomparable where a particle is
+// A distance [h] as a byte: 0 for none at all, else four to a decade from 1e-18 h on; kIncomparable where a particle is
 // alive in one state only, or somewhere that is no place.
 inline constexpr uint8_t kIncomparable = 255;
 uint8_t code_of(double distance);

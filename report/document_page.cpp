@@ -68,7 +68,6 @@ json side_json(const Side& side, std::vector<std::string>& chunks) {
           {"firstChunk", first},
           {"marks", std::move(marks)},
           {"loss", pictures.own.loss},
-          {"nowhere", pictures.own.nowhere},
           {"thinned", pictures.thinning != Thinning()},
           {"reach",
            {{pictures.reach_low.x, pictures.reach_low.y, pictures.reach_low.z},

@@ -49,7 +49,8 @@ json row_json(const PropertyRow& row) {
           {"measured", row.measured},
           {"bound", row.bound},
           {"ofBound", json_number(row.of_bound)},
-          {"asksWider", oracles::asks_wider(row.property)}};
+          {"asksWider", oracles::asks_wider(row.property)},
+          {"ofJudging", oracles::is_of_the_judging(row.property)}};
 }
 
 json series_json(const std::vector<Series>& all) {
@@ -130,7 +131,6 @@ json data_json(const Source& source, const Results& results, const Pictures& pic
            {{pictures.reach_low.x, pictures.reach_low.y, pictures.reach_low.z},
             {pictures.reach_high.x, pictures.reach_high.y, pictures.reach_high.z}}},
           {"loss", std::max(pictures.own.loss, pictures.beside.loss)},
-          {"nowhere", std::max(pictures.own.nowhere, pictures.beside.nowhere)},
           {"thinned", thinned_in_words(pictures, source.setup.body.particle_count(), source.is_foreign())},
           // A run of somebody else's has frames without stages; with or without pieces, which need tissue.
           {"foreign", source.is_foreign()},

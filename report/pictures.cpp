@@ -162,10 +162,6 @@ class Chunk {
       };
       if (!picture.x.empty()) {
         add_points("x", picture.x, before_x);
-        const std::size_t n = picture.x.size();
-        int64_t nowhere = 0;
-        for (std::size_t i = 0; i < n; ++i) nowhere += before_x[i] == kNowhere;
-        result.nowhere = std::max(result.nowhere, nowhere);
       }
       if (!picture.alive.empty()) {
         one["alive"] = {bytes.size(), picture.alive.size()};
@@ -215,6 +211,31 @@ json pose_json(const Setup& setup, const Moment& moment) {
 
 // Patches of the blade's sweep that a page draws of one moment at most, and of all moments.
 constexpr std::size_t kMostPatches = 500, kPatchesOfPage = 20'000;
+
+// Of the particles alive in a state: how many no page draws, because they are not finite or far outside; and of the
+// others the middle, and how far they reach from it along each axis [m].
+void add_extent(json& detail, const State& state, const Box& outer) {
+  Vec3 sum, half;
+  int64_t count = 0, nowhere = 0;
+  const auto each = [&](const auto& see) {
+    for (std::size_t i = 0; i < state.x.size(); ++i) {
+      if (state.alive[i] != 0) see(state.x[i], is_within(state.x[i], outer));
+    }
+  };
+  each([&](Vec3 x, bool is_drawn) {
+    if (is_drawn) sum = sum + x;
+    ++(is_drawn ? count : nowhere);
+  });
+  const Vec3 middle = sum / static_cast<double>(std::max<int64_t>(count, 1));
+  each([&](Vec3 x, bool is_drawn) {
+    for (int axis = 0; axis < 3 && is_drawn; ++axis) half[axis] = std::max(half[axis], std::abs(x[axis] - middle[axis]));
+  });
+  detail["nowhere"] = nowhere;
+  if (count > 0) {
+    detail["middle"] = point_json(middle);
+    detail["half"] = point_json(half);
+  }
+}
 
 // Of what the blade has swept since the moment before; what is too much is left out evenly.
 json swept_json(const std::vector<Vec3>& corners, std::size_t most, int64_t& left_out) {
@@ -411,13 +432,25 @@ class Walk {
   int64_t index_ = -1, before_index_ = -2;
 };
 
+// Of the distances other than 0 that are comparable; null where there is none.
+json least_and_greatest(const std::vector<uint8_t>& codes) {
+  uint8_t least = kIncomparable, greatest = 0;
+  for (const uint8_t code : codes) {
+    if (code == 0 || code == kIncomparable) continue;
+    least = std::min(least, code);
+    greatest = std::max(greatest, code);
+  }
+  return greatest == 0 ? json() : json{least, greatest};
+}
+
 json apart_json(const Apart& apart, const Kept& kept) {
   const bool is_kept = apart.where >= 0 && std::binary_search(kept.particle.begin(), kept.particle.end(), apart.where);
   return {{"max", json_number(apart.max)},
           {"rms", json_number(apart.rms)},
           {"particle", apart.where},
           {"place", is_kept ? kept.place[at(apart.where)] : -1},
-          {"differs", apart.differs}};
+          {"differs", apart.differs},
+          {"codes", least_and_greatest(apart.codes)}};
 }
 
 // Pictures of one of the two runs at these moments. `other`: the one beside it, to which the distance is measured; null
@@ -490,6 +523,7 @@ Chunks drawn(const Source& source, const Source* other, bool is_own, const std::
     if (snapshot > 0 && is_of_this && !source.is_foreign())
       picture.change = only(changes_between(walk.before(), state), kept);
     json one = detail(source.setup, both.moment, state, pieces.count, alive);
+    add_extent(one, state, outer);
     if (source.is_foreign()) {
       one["swept"] = swept_json(swept, most_patches, result.patches_left_out);
       if (of_run.time && std::isfinite(*of_run.time)) one["time"] = *of_run.time;

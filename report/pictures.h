@@ -76,7 +76,6 @@ struct Chunks {
   nlohmann::json details;                 // one for each moment: what the page's words need
   double loss = 0;                        // by how much a place may be off [h]
   int64_t patches_left_out = 0;           // of the blade's sweep, which are not drawn
-  int64_t nowhere = 0;  // greatest count of particles that one moment does not show: not finite, or far outside
   int64_t bytes = 0;
 };
 

@@ -66,14 +66,17 @@ function stretches(xyz, alive, edges) {
 // So many numbers have a key each; of more there is a scale.
 const kMostKeys = 9;
 
-// A distance of its byte (report/beside.h): four to a decade from 1e-12 h on.
-const decade = (code) => code / 4 - 12;
+// A distance of its byte (report/beside.h): four to a decade from 1e-18 h on.
+const decade = (code) => code / 4 - 18;
 
 // Each: what it is called, and of a picture the colour of each particle and a legend: words, a scale or keys.
 // `comparison`: with another run, or null. foreign: of somebody else's run, whose clusters are coupling groups.
-export function colourings(hasStretch, comparison, { foreign, hasPieces, hasGroups } = { hasPieces: true, hasGroups: true }) {
+export function colourings(hasStretch, comparison, { foreign, hasPieces, hasGroups, moments } = { hasPieces: true, hasGroups: true, moments: [] }) {
   let farthest = 1e-9;  // so far, so that colours mean the same from frame to frame
-  let least = 250, most = 1;
+  // Of all moments, so that a colour is one distance.
+  const ranges = moments.map((moment) => moment.apart && moment.apart.codes).filter(Boolean);
+  const most = ranges.reduce((most, [, code]) => Math.max(most, code), 1);
+  const low = ranges.reduce((least, [code]) => Math.min(least, code), Math.max(most - 4, 0));
   const all = {
     piece: {
       name: 'piece of tissue',
@@ -131,18 +134,10 @@ export function colourings(hasStretch, comparison, { foreign, hasPieces, hasGrou
       of({ moment, apart }) {
         const codes = moment.apart;
         if (!apart) return { colour: () => kGrey, words: 'This moment has no counterpart, so there is no distance.' };
-        if (codes) {
-          for (const code of codes) {
-            if (code === 0 || code === kIncomparable) continue;
-            if (code < least) least = code;
-            if (code > most) most = code;
-          }
-        }
-        const low = Math.min(least, most - 4);
         return {
           colour: (i) => { const code = codes ? codes[i] : 0; return code === kIncomparable ? changeColours[3] : code === 0 ? ramp[0] : onRamp((code - low) / (most - low)); },
           words: `Distance to ${comparison.obtained}; on a logarithmic scale. Orange: there in one of the two only.`,
-          scale: codes ? [`0 or ${figure(10 ** decade(low))} h`, `${figure(10 ** decade(most))} h`] : ['0 h', 'nowhere more'],
+          scale: ranges.length ? [`${figure(10 ** decade(low))} h or less`, `${figure(10 ** decade(most))} h`] : ['0 h', 'nowhere more'],
         };
       },
     },

@@ -4,7 +4,7 @@ import { colourings, rampStops } from './colours.js';
 import { apartInWords, comparisonCard } from './compare.js';
 import { showDocuments } from './documents.js';
 import { badge, byId, count, drawing, element, figure, icon, plural, sayMade } from './dom.js';
-import { markedWords, marksOf } from './marks.js';
+import { hasPlace, markedWords, marksOf } from './marks.js';
 import { plotsOf } from './plots.js';
 import { openLinked } from './sources.js';
 import { cards, command, table } from './verdicts.js';
@@ -15,6 +15,7 @@ const data = JSON.parse(byId('data').textContent);
 const moments = new Moments(data.firstMoment || []);
 const comparison = data.comparison;
 const besides = comparison && comparison.shown ? new Moments(data.besideFirst, 'beside') : null;
+const sideNames = besides ? [comparison.ownName, comparison.name] : [];
 const last = (data.moments || []).length - 1;
 const kFramesPerSecond = 15;
 const hasGroups = Boolean(data.frames) && data.frames.clusters.some((n) => n > 0);
@@ -34,7 +35,9 @@ function header() {
   const kind = !data.checked ? 'muted' : data.holds ? 'good' : 'bad';
   byId('summary').append(badge(kind, !data.checked ? 'not judged' : data.holds ? 'holds' : 'fails'), element('span', { text: data.summary }));
   const hasFrames = data.command !== 'check_state' && !isPreview;
-  const facts = [`${plural(data.body.particles, 'particle')}`, `h = ${figure(1e3 * data.body.spacing)} mm`, hasFrames && plural(data.frames.frame.filter((frame) => frame >= 0).length, 'frame')].filter(Boolean);
+  // Of somebody else's run there may be more from frame to frame.
+  const [begins, ends] = data.foreign ? [data.frames.particles[0], data.frames.particles[data.frames.particles.length - 1]] : [];
+  const facts = [begins === ends ? plural(data.body.particles, 'particle') : `${plural(begins, 'particle')} at first, ${count(ends)} at the end`, `h = ${figure(1e3 * data.body.spacing)} mm`, hasFrames && plural(data.frames.frame.filter((frame) => frame >= 0).length, 'frame')].filter(Boolean);
   if (data.checked) facts.push(plural(data.verdicts, 'verdict'));
   if (data.judgedBy && data.judgedBy !== data.made.program) facts.push(`judged by cutproof ${data.judgedBy}`);
   byId('facts').textContent = facts.join(' · ');
@@ -71,7 +74,7 @@ function timeline() {
   if (data.moments.some((m) => m.removed > 0)) keys.push(['cut', 'particles are removed']);
   if (data.foreign) {
     data.moments.forEach((moment, k) => { if (moment.swept.length && !(moment.removed > 0)) mark(k, 'cut', 9, 5); });
-    if (data.moments.some((m) => m.swept.length)) keys.push(['cut', 'the blade is in the tissue']);
+    if (data.moments.some((m) => m.swept.length)) keys.push(['cut', 'the blade moves']);
   }
   const legendOfIt = element('ul', { class: 'legend' }, ...keys.map(([kind, text]) => element('li', {}, element('span', { class: `key ${kind}` }), element('span', { text }))));
   return [svg, legendOfIt];
@@ -172,8 +175,15 @@ async function update() {
   range.setAttribute('aria-valuetext', words(moment));
   const facts = [data.hasPieces && plural(moment.components, 'piece'), hasGroups && plural(moment.clusters, data.foreign ? 'coupling group' : 'cluster'), plural(moment.particles, 'particle')].filter(Boolean);
   if (moment.time !== undefined) facts.unshift(`${figure(moment.time)} s`);
-  if (data.foreign && moment.swept.length) facts.push('the blade is in the tissue');
+  if (data.foreign && moment.swept.length) facts.push('the blade moves');
   if (moment.removed > 0) facts.push(`${count(moment.removed)} removed in this frame`);
+  const abouts = besides ? [moment, data.besideMoments[state.at]] : [moment];
+  abouts.forEach((about, k) => {
+    const text = about.nowhere > 0 ? `${plural(about.nowhere, 'particle')} not drawn: far outside, or no numbers` : '';
+    if (text) facts.push(besides ? `${sideNames[k]}: ${text}` : text);
+    const side = document.querySelectorAll('.side')[k];
+    if (side) side.textContent = text ? `${sideNames[k]}: ${text}` : sideNames[k];
+  });
   if (data.blade) facts.push(moment.blade ? 'blade down' : 'blade up');
   const apart = apartInWords(comparison, moment);
   if (apart) facts.push(apart);
@@ -185,10 +195,9 @@ async function update() {
   view.isAwaited = true;
   const arrays = await Promise.all([moments.get(state.at), ...(besides ? [besides.get(state.at)] : [])]).finally(() => { if (ticket === shown) view.isAwaited = false; });
   if (ticket !== shown) return;  // somebody has gone on meanwhile
-  const abouts = besides ? [moment, data.besideMoments[state.at]] : [moment];
   const spot = state.spot === null ? null : { particles: [state.spot], path: [], members: [] };
   const marks = found && marksOf(found);
-  const said = view.show(arrays, abouts, look, marks || spot);
+  const said = view.show(arrays, abouts, look, marks && hasPlace(marks) ? marks : spot);
   const legends = [element('span', { text: said.words })];
   if (said.blade) legends.push(element('span', { id: 'blade-words', text: ` ${said.blade}` }));
   if (said.scale) {
@@ -323,7 +332,6 @@ function about() {
   const say = (text) => section.append(element('p', { text }));
   say(`Positions on this page are rounded to steps of 16 bits, and so off by at most ${figure(data.loss)} h (h is the spacing of particles). Verdicts were made from the full numbers.`);
   if (data.thinned) say(data.thinned);
-  if (data.nowhere > 0) say(`Up to ${plural(data.nowhere, 'particle')} of a moment are not drawn: their positions are no numbers, or far outside the body.`);
   const stages = !hasStages ? '' : ' A frame is step, detect, split, merge, expand and skin; a stage that had nothing to do is left out.';
   say(`Frames count from 0.${stages} This page holds ${plural(data.moments.length, 'moment')}. It needs no network. Keys in the 3D view: arrows turn, with Shift they shift; + and − zoom, 0 shows the whole body; space plays, comma and full stop go a ${hasStages ? 'stage' : 'frame'} back and on; C cuts the body open, [ and ] move the cut and Alt with arrows turns it, as dragging with Alt and with Alt and Shift does.`);
   if (!comparison && hasStages) say('A distance to the reference is shown where one was asked for: cutproof run --against reference --report, or cutproof report with a second recording.');
@@ -332,6 +340,7 @@ function about() {
 async function main() {
   header();
   findings();
+  if (hasStages) byId('verdicts-title').textContent = 'Every property after each stage';
   if (data.rows.length) byId('verdicts').append(table(data, jump)); else byId('verdicts').remove();
   plots = isPreview ? [] : plotsOf(data, (frame) => jump(frame, 'skin'));
   if (plots.length) byId('plots').append(element('div', { class: 'grid' }, ...plots.map((one) => one.card))); else byId('plots').remove();
@@ -344,7 +353,7 @@ async function main() {
   const found = contextOf(canvas);
   if (found) {
     view = new View(canvas, found, data);
-    if (comparison && comparison.shown) place.append(element('p', { class: 'side', text: comparison.ownName }), element('p', { class: 'side other', text: comparison.name }));
+    if (besides) place.append(element('p', { class: 'side' }), element('p', { class: 'side other' }));
   } else {
     place.replaceChildren(element('p', { class: 'nothing', id: 'no-webgl', text: 'This browser shows no 3D view (WebGL is not there). Everything else on this page works.' }));
   }

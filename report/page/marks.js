@@ -7,6 +7,8 @@ export function marksOf({ property, marks }) {
   return { ...marks, neighbours: isPair ? marks.particles.slice(1) : [] };
 }
 
+export const hasPlace = ({ particles, path, members, corners }) => particles.length + path.length + members.length + corners.length > 0;
+
 function listed(numbers) {
   const kMost = 4;
   const said = numbers.slice(0, kMost).map(String);

@@ -116,8 +116,9 @@ export function plotsOf(data, jump) {
   const ends = data.frames;
   const first = (column) => ends[column][0], last = (column) => ends[column][ends[column].length - 1];
   const greatest = (column) => ends[column].reduce((a, b) => Math.max(a, b), 0);
-  const changes = (column, what) => (first(column) === last(column) && greatest(column) === first(column)
-    ? `${count(first(column))} ${what} throughout.` : `From ${count(first(column))} to ${count(last(column))}, at most ${count(greatest(column))}.`);
+  const least = (column) => ends[column].reduce((a, b) => Math.min(a, b), Infinity);
+  const changes = (column, what) => (least(column) === greatest(column)
+    ? `${count(first(column))} ${what} throughout.` : `${count(first(column))} at first, ${count(last(column))} at the end; between ${count(least(column))} and ${count(greatest(column))}.`);
   if (ends.frame.length > 1) {
     const lines = (title, column, unit, words) => found.push(plot({ title, words, unit, frames: ends.frame, series: [{ name: unit, values: ends[column] }], kind: 'lines', whole: true, jump }));
     if (data.hasPieces) lines('Pieces of tissue', 'components', 'pieces', changes('components', first('components') === 1 ? 'piece' : 'pieces'));

@@ -119,8 +119,10 @@ function putPatches(faces, rims, patches, centre, spacing) {
 }
 
 export class Tissue {
-  constructor(data, plane) {
+  // moments: of this run.
+  constructor(data, moments, plane) {
     this.data = data;
+    this.moments = moments;
     this.facing = null;  // of the triangles that are marked
     this.body = new Group();
     const m = data.body.orientation;
@@ -149,8 +151,9 @@ export class Tissue {
   }
 
   // The whole way of the blade's edge, of each moment of somebody else's run what it has swept: four corners each [m].
+  // The latter from the body's middle in its moment: a body that falls takes along where it has been cut.
   way() {
-    if (this.data.foreign) return this.data.moments.flatMap((moment) => moment.swept);
+    if (this.data.foreign) return this.moments.flatMap(({ swept, middle }) => swept.map((x, k) => x - (middle ? middle[k % 3] : 0)));
     const corners = [], half = this.data.blade ? this.data.blade.size[0] / 2 : 0;
     const end = (places, k, side) => [0, 1, 2].map((c) => places[6 * k + c] + side * half * places[6 * k + 3 + c]);
     for (const places of this.data.blade ? this.data.blade.way : []) {
@@ -165,7 +168,7 @@ export class Tissue {
   makeWay(centre, spacing) {
     const patches = new Mesh(new BufferGeometry(), new MeshBasicMaterial({ color: 0x7d93a8, transparent: true, opacity: 0.13, side: DoubleSide, depthWrite: false }));
     const rims = new LineSegments(new BufferGeometry(), new LineBasicMaterial({ color: 0x7d93a8, transparent: true, opacity: 0.75 }));
-    putPatches(patches, rims, this.way(), centre, spacing);
+    putPatches(patches, rims, this.way(), this.data.foreign ? [0, 0, 0] : centre, spacing);
     for (const made of [patches, rims]) [made.frustumCulled, made.renderOrder] = [false, 0.5];
     this.ofWay = new Group();
     this.ofWay.add(patches, rims);
@@ -268,8 +271,9 @@ export class Tissue {
       this.steel.depthTest = !marks && !hasParticles;
     }
     if (!this.ofWay) this.makeWay(centre, spacing);
-    this.ofWay.visible = look.way && !marks && !look.isCut;
-    const isWaySeen = this.ofWay.visible && this.hasWay();
+    this.ofWay.visible = look.way;
+    if (this.data.foreign && about.middle) this.ofWay.position.set(...about.middle.map((x, k) => (x - centre[k]) / spacing));
+    const isWaySeen = look.way && this.hasWay();
     const steel = this.swept ? this.showSwept(about.swept, Boolean(marks), centre, spacing) : about.blade ? 'Steel: the blade.' : '';
     const blade = [steel, isWaySeen && 'Pale: the way of its edge.'].filter(Boolean).join(' ');
     this.showMarks(moment, marks, isRing, placesOfIt, centre, spacing);

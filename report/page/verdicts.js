@@ -1,5 +1,6 @@
 // What fails, each with its witness; and a table of every property.
 import { count, element, icon, plural } from './dom.js';
+import { hasPlace } from './marks.js';
 import { nameNode, sourceNodes } from './sources.js';
 
 const withUnit = (text, unit) => (unit ? `${text} ${unit}` : text);
@@ -38,9 +39,10 @@ function statusOf(row, data) {
   return ['good', row.undecided > 0 ? 'holds, some within rounding' : 'holds'];
 }
 
-export const exactWords = (n) => `${count(n)} exact ${n === 1 ? 'property holds' : 'properties hold'}`;
+export const exactWords = (n) => `${plural(n, 'more row')}: exact, and ${n === 1 ? 'it holds' : 'they hold'}`;
+const holds = (row) => row.judged > 0 && row.failed + row.expected === 0;
 // It counts, and has no margin.
-const isExact = (row) => row.judged > 0 && row.failed + row.expected === 0 && row.ofBound === null;
+const isExact = (row) => holds(row) && row.bound === '0';
 
 // Many rows of which none says more than the others, behind one that opens.
 export function folded(rows, words, columns = 6) {
@@ -53,7 +55,7 @@ export function folded(rows, words, columns = 6) {
 }
 
 export function table(data, jump) {
-  const shown = [], exact = [], others = [];
+  const shown = [], exact = [], ofJudging = [], others = [];
   for (const row of data.rows) {
     const [kind, words] = statusOf(row, data);
     const fails = row.failed + row.expected > 0;
@@ -64,7 +66,7 @@ export function table(data, jump) {
     else if (row.judged > 0) details.push(data.foreign ? `${count(row.checked)} looked at` : plural(row.judged, 'verdict'));
     else details.push(row.vacuous || 'there was nothing to look at');
     if (row.undecided > 0) details.push(`${plural(row.undecided, 'thing')} undecidable within rounding, counted as right`);
-    (isExact(row) ? exact : row.judged > 0 ? shown : others).push(element('tr', { class: fails ? kind : null },
+    (holds(row) && row.ofJudging ? ofJudging : isExact(row) ? exact : row.judged > 0 ? shown : others).push(element('tr', { class: fails ? kind : null },
       element('th', { scope: 'row' }, nameNode(row.property, data.command), !data.foreign && element('span', { class: 'muted small', text: ` after ${row.stage}` })),
       element('td', {}, element('span', { class: `status ${kind}` }, icon(kind), element('span', { text: words })), element("span", { class: "muted small block", text: details.join('; ') })),
       element('td', {}, row.judged > 0 && bar(row, fails)),
@@ -76,6 +78,7 @@ export function table(data, jump) {
   return element('div', { class: 'scroll', tabindex: 0, role: 'region', 'aria-label': 'Every property' }, element('table', { class: 'verdicts' },
     element('thead', {}, element('tr', {}, ...head.map((text) => element('th', { scope: 'col', text })))), element('tbody', {}, ...shown),
     ...(exact.length ? folded(exact, exactWords(exact.length)) : []),
+    ...(ofJudging.length ? folded(ofJudging, `${plural(ofJudging.length, 'check')} of the judging itself: ${ofJudging.length === 1 ? 'it holds' : 'they hold'}`) : []),
     ...(others.length ? folded(others, `${plural(others.length, 'property', 'properties')} ${data.foreign ? 'not judged' : 'with nothing to look at'}`) : [])));
 }
 
@@ -95,14 +98,13 @@ export function cards(data, show) {
     const button = (k, text) => element('button', { type: 'button', class: 'finding', 'data-finding': k, 'aria-pressed': 'false', text, onclick: () => show(k) });
     const row = data.rows.find((one) => one.property === first.property && one.stage === first.stage);
     const text = element('p', { class: 'witness', text: first.text || 'It has no witness.' });
-    const marks = first.marks.particles.length + first.marks.path.length + first.marks.members.length > 0;
     found.push(element('article', { class: `card ${first.expected ? 'warn' : 'bad'}` },
       element('h3', {}, nameNode(first.property, data.command), !data.foreign && element('span', { class: 'muted', text: ` after ${first.stage}` })),
       text,
       element('p', { class: 'muted small' }, first.measured !== 'nothing' && element('span', {}, `Measured ${withUnit(first.measured, first.unit)}, bound ${withUnit(first.bound, first.unit)} (`, ...sourceNodes(first.source), '). '),
         element('span', { text: row && row.failed + row.expected > 1 ? `It fails in ${count(row.failed + row.expected)} of ${plural(row.judged, 'verdict')}.` : '' }),
         first.expected && element('span', { text: ' The scene expects it to fail.' })),
-      element('div', { class: 'row' }, button(members[0], isLone ? 'Show me' : marks ? `Show me: frame ${first.frame}` : `Go to frame ${first.frame}`)),
+      element('div', { class: 'row' }, button(members[0], isLone ? 'Show me' : hasPlace(first.marks) ? `Show me: frame ${first.frame}` : `Go to frame ${first.frame}`)),
       members.length > 1 && element('details', {}, element('summary', { text: `Again in ${plural(members.length - 1, 'later verdict')}` }),
         element('ul', { class: 'again-in' }, ...members.slice(1).map((k) => element('li', {}, button(k, `frame ${data.findings[k].frame}`), element('span', { class: 'small', text: ` ${data.findings[k].text}` })))))));
   }

@@ -1,6 +1,6 @@
 // The 3D view: one run, or two beside each other, seen by one camera. Lengths are in h, the middle of the body is 0.
 import { Color, PerspectiveCamera, Scene, WebGLRenderer } from 'three';
-import { kNowhere, kStride, places, scaleOf } from './coding.js';
+import { places } from './coding.js';
 import { CutPlane } from './cut_plane.js';
 import { Orbit } from './orbit.js';
 import { Tissue } from './tissue.js';
@@ -8,7 +8,7 @@ import { Tissue } from './tissue.js';
 // A run that needs the camera so many times farther away than the body as it began is not fitted as a whole.
 const kFarthest = 2;
 // A body of fewer particles is small. Beside what is marked, the view's middle lies so far towards that of the body.
-const kSmallBody = 1000, kTowardsMiddle = 0.3, kTowardsMiddleOfSmall = 0.5;
+const kSmallBody = 1000, kTowardsMiddle = 0.3;
 
 // While somebody scrubs, plays or turns where pictures take long: a picture of so many times fewer pixels along each
 // side now rather than a sharp one later, of the next as many if a few in a row take too long; and a sharp one after so
@@ -28,6 +28,8 @@ export function contextOf(canvas) {
   return context && { context, isSoftware };
 }
 
+const cornersOf = (low, high) => Array.from({ length: 8 }, (_, corner) => [0, 1, 2].map((k) => ((corner >> k) & 1 ? high : low)[k]));
+
 export class View {
   constructor(canvas, { context, isSoftware }, data) {
     this.data = data;
@@ -43,7 +45,7 @@ export class View {
     this.scene = new Scene();
     this.plane = new CutPlane(data.body.orientation, () => this.draw());
     const sides = data.comparison && data.comparison.shown ? 2 : 1;
-    this.sides = Array.from({ length: sides }, () => new Tissue(data, this.plane.uniform));
+    this.sides = [data.moments, data.besideMoments].slice(0, sides).map((moments) => new Tissue(data, moments, this.plane.uniform));
     for (const { body } of this.sides) this.scene.add(body);
     this.camera = new PerspectiveCamera(32, 1, 0.1, 1000);
     this.camera.up.set(0, 0, 1);
@@ -97,21 +99,27 @@ export class View {
       const run = (x - this.centre[k]) / spacing, half = this.extent[k] / 2;
       return side === 0 ? Math.min(run, -half) : Math.max(run, half);
     }));
-    return Array.from({ length: 8 }, (_, corner) => [0, 1, 2].map((k) => ((corner >> k) & 1 ? high : low)[k]));
+    return cornersOf(low, high);
   }
 
   // From where the whole run fills the view; what has flown far away does not count, and the view goes along with
   // somebody else's run.
   fitHome() {
     const from = (target, points) => this.distanceFrom(target, points.map((p) => this.turned(p)));
-    const begun = [];
+    const begun = [], spacing = this.data.body.spacing || 1;
     const every = 3 * Math.max(1, Math.floor(this.start.length / 30000));
     for (let i = 0; i < this.start.length; i += every) {
       if (!Number.isNaN(this.start[i])) begun.push(this.start.subarray(i, i + 3));
     }
     const home = this.orbit.home, begins = 1.12 * from([0, 0, 0], begun);
     home.distance = begins;
-    if (this.data.foreign) return;
+    if (this.data.foreign) {
+      // Around the middle of whatever moment is shown.
+      const abouts = [...this.data.moments, ...(this.data.besideMoments || [])].filter((about) => about.half);
+      const half = [0, 1, 2].map((k) => abouts.reduce((most, about) => Math.max(most, about.half[k] / spacing), 0));
+      home.distance = Math.min(Math.max(begins, 0.93 * from([0, 0, 0], cornersOf(half.map((x) => -x), half))), kFarthest * begins);
+      return;
+    }
     const corners = this.cornersOfRun();
     const middle = this.turned([0, 1, 2].map((k) => (corners[0][k] + corners[7][k]) / 2));
     // Little of a box lies at its corners.
@@ -248,24 +256,12 @@ export class View {
   // moments: of each run its arrays; abouts: what the page says of them. Returns the legend, of the first.
   show(moments, abouts, look, marks) {
     const about = { centre: this.centre, start: this.start, edges: this.edges, first: this.first };
-    const seen = { ...look, isCut: this.plane.isOn };
-    if (this.data.foreign) this.orbit.follow(this.middleOf(moments[0]));
+    const seen = { ...look, way: look.way && !marks && !this.plane.isOn, isCut: this.plane.isOn };
+    const { middle } = abouts[0], spacing = this.data.body.spacing || 1;
+    if (this.data.foreign && middle) this.orbit.follow(middle.map((x, k) => (x - this.centre[k]) / spacing));
     const legends = this.sides.map((side, k) => side.show(moments[k], abouts[k], seen, k === 0 ? marks : null, about));
     this.draw();
     return legends[0];
-  }
-
-  // Of what is there in a moment; where that is nothing, as before.
-  middleOf(moment) {
-    const { low, step } = scaleOf(moment, this.centre, this.data.body.spacing || 1);
-    const sum = [0, 0, 0];
-    let n = 0;
-    for (let i = 0; i < moment.alive.length; ++i) {
-      if (!moment.alive[i] || moment.x[kStride * i] === kNowhere) continue;
-      for (let k = 0; k < 3; ++k) sum[k] += moment.x[kStride * i + k];
-      ++n;
-    }
-    return n ? sum.map((x, k) => low[k] + (step[k] * x) / n) : this.orbit.middle;
   }
 
   // Flies to what is marked, if anything is; or to where another view has flown.
@@ -290,14 +286,14 @@ export class View {
     }
     const radius = Math.hypot(...low.map((x, k) => high[k] - x)) / 2;
     const middle = low.map((x, k) => (x + high[k]) / 2);
-    // Never so near that nobody sees where in the body it is: little is seen of a small body at all, and a triangle of
-    // the skin is small.
-    const isSmall = this.data.body.particles < kSmallBody, isTriangle = this.sides[0].facing !== null;
-    const nearest = this.radius * (isTriangle ? (isSmall ? 0.6 : 0.3) : isSmall ? 0.8 : 0.5);
-    const seen = Math.min(this.radius, Math.max(1.8 * radius + 2, nearest));
+    const isTriangle = this.sides[0].facing !== null, angles = isTriangle ? this.anglesFacing(this.sides[0].facing) : undefined;
+    // A small body is seen whole.
+    if (this.data.body.particles < kSmallBody) return [this.orbit.home.target, this.orbit.home.distance, angles];
+    // Never so near that nobody sees where in the body it is; a triangle of the skin is small.
+    const seen = Math.min(this.radius, Math.max(1.8 * radius + 2, this.radius * (isTriangle ? 0.3 : 0.5)));
     // Marks at the rim would leave half of the view empty.
-    const target = middle.map((x, k) => x + (isSmall ? kTowardsMiddleOfSmall : kTowardsMiddle) * (this.orbit.middle[k] - x));
-    return [target, this.distanceFor(seen), isTriangle ? this.anglesFacing(this.sides[0].facing) : undefined];
+    const target = middle.map((x, k) => x + kTowardsMiddle * (this.orbit.middle[k] - x));
+    return [target, this.distanceFor(seen), angles];
   }
 
   // The angles from which a surface is seen that faces this way. Not from straight above or

@@ -394,7 +394,7 @@ TEST(Pictures, OfAStateWithoutSenseAreDrawnAllTheSame) {
                            return snapshot;
                          }};
   const Pictures pictures = pictures_of(source, {finding_in(500)}, kMostPictureBytes);
-  EXPECT_EQ(pictures.own.nowhere, 2);
+  EXPECT_EQ(pictures.own.details.at(1).at("nowhere"), 2);
   // The body's 2 h, and the skin's vertex one spacing before it; rounded once or twice.
   EXPECT_LE(pictures.own.loss, 3.0 / 65'534 / 2 * (1 + 1e-12)) << "what is far away costs the others no places";
   EXPECT_FALSE(pictures.marks.at(0).is_exact);
@@ -472,7 +472,7 @@ TEST(Apart, SaysHowFarAndInWhatFirst) {
   EXPECT_NEAR(apart.max, 4e-3, 1e-15);
   EXPECT_NEAR(apart.rms, 2.5e-3, 1e-15);
   EXPECT_EQ(apart.codes[0], 0);
-  EXPECT_NEAR(apart.codes[1], 4 * (std::log10(4e-3) + 12), 0.51);
+  EXPECT_NEAR(apart.codes[1], 4 * (std::log10(4e-3) + 18), 0.51);
   other.x[1].z = std::nan("");
   EXPECT_EQ(apart_of(one, other, kSpacing).max, std::numeric_limits<double>::infinity());
   EXPECT_EQ(apart_of(other, other, kSpacing).max, 0) << "equal to the bit, if nowhere";
