@@ -15,6 +15,7 @@
 #include "cli/terminal.h"
 #include "harness/foreign_run.h"
 #include "harness/run_states.h"
+#include "model/counted.h"
 #include "model/io/atomic_file.h"
 #include "model/io/verdict_json.h"
 #include "report/page.h"
@@ -23,7 +24,7 @@ namespace cutproof::cli {
 
 namespace {
 
-// "2 pieces of 60 and 60 particles by the blade's sweep"; of many, the largest.
+// "2 pieces by the blade's sweep (60, 60 particles)"; of many, the largest.
 std::string in_words(const oracles::RunPieces& pieces) {
   if (pieces.units == 0) return "the run has no tissue that pieces could be told of";
   std::string sizes;
@@ -31,10 +32,12 @@ std::string in_words(const oracles::RunPieces& pieces) {
     sizes += (k == 0 ? "" : ", ") + std::to_string(pieces.sizes[k]);
   }
   if (pieces.sizes.size() > 5) sizes += ", …";
-  std::string text =
-      fmt::format("{} {} by the blade's sweep ({})", pieces.pieces, pieces.pieces == 1 ? "piece" : "pieces", sizes);
-  if (pieces.at_most > pieces.pieces) text += fmt::format(", perhaps {}", pieces.at_most);
-  if (pieces.coupled > 0) text += fmt::format("; {} coupled", pieces.coupled);
+  const bool is_sure = pieces.at_most <= pieces.pieces;
+  std::string text = is_sure ? counted(pieces.pieces, "piece", "pieces")
+                             : fmt::format("{} to {} pieces", pieces.pieces, pieces.at_most);
+  text += fmt::format(" by the blade's sweep ({}{} {})", is_sure ? "" : "surely: ", sizes,
+                      pieces.of_cells ? "cells" : "particles");
+  if (pieces.coupled > 0) text += "; coupled as " + counted(pieces.coupled, "piece", "pieces");
   return text;
 }
 

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <limits>
 #include <memory>
@@ -124,7 +125,7 @@ void print_coverage(const json& document) {
 void print_properties(const json& properties) {
   Table table({"property", "after", "judged", "failed", "of bound", "undecided"});
   const json* nearest = nullptr;
-  int64_t holds = 0, judged = 0, doubtful = 0;
+  int64_t holds = 0, doubtful = 0;
   std::vector<std::string> failed;
   for (const json& each : properties) {
     const bool has_share = each.at("of_bound").is_number();
@@ -136,7 +137,6 @@ void print_properties(const json& properties) {
       failed.push_back(printable(io::filled("{property} after {stage} ({failed} of {judged} verdicts)", each)));
     } else if (each.at("judged") > 0) {
       ++holds;
-      judged += each.at("judged").get<int64_t>();
       const bool tells = has_share && !oracles::asks_wider(each.at("property").get<std::string>());
       if (tells && (nearest == nullptr || each.at("of_bound") > nearest->at("of_bound"))) nearest = &each;
     }
@@ -145,8 +145,7 @@ void print_properties(const json& properties) {
   if (style().verbose) say_as_it_is(table.text());
   if (!failed.empty()) insist("{}: {}\n", failing("what fails"), fmt::join(failed, ", "));
   if (holds > 0) {
-    say("{} pairs of a property and a stage {}, in {} verdicts", holds, holding(holds == 1 ? "holds" : "hold"),
-        io::grouped(judged));
+    say("{} pairs of a property and a stage {}", holds, holding(holds == 1 ? "holds" : "hold"));
     if (nearest != nullptr) {
       say_filled("; the nearest to its bound: {property} after {stage}", *nearest);
       say(", at {} of it", io::share_of(nearest->at("of_bound").get<double>()));
@@ -173,10 +172,10 @@ void print_campaign(const json& document) {
   if (document.at("refused") > 0) {
     say("{}\n", undecided(io::filled("{refused} cases were refused: nothing is known of them", document)));
   }
-  say_filled(
-      "{cases} cases of {mean_particles:.0f} particles on average, {verdicts} verdicts, {seconds:.1f} s, "
-      "{cases_per_second:.0f} cases/s\n",
-      document);
+  const auto grouped = [&](const char* name) { return io::grouped(document.at(name).get<int64_t>()); };
+  say("{} cases of {:.0f} particles on average, {} verdicts, {:.1f} s, {} cases/s\n", grouped("cases"),
+      document.at("mean_particles").get<double>(), grouped("verdicts"), document.at("seconds").get<double>(),
+      io::grouped(std::llround(document.at("cases_per_second").get<double>())));
 }
 
 namespace {

@@ -183,7 +183,7 @@ int kick(const KickOptions& options) {
       kick.runs.kicks.size() > 1 ? fmt::format(", {} kicks", kick.runs.kicks.size()) : "");
   print_pieces(kick, report);
   Shown shown{options.again};
-  shown.in_frames = false;
+  shown.in_stages = false;
   show_judged(verdicts, {}, notes_of(report, kick), shown, judging, reports, shares_of(report));
   return report.holds() ? 0 : 1;
 }

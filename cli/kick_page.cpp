@@ -101,9 +101,8 @@ void write_kick_page(const std::string& path, const harness::RecordedKick& kick,
                                  "the same particle of the run without a kick, in the same frame"};
   if (runs.kicks.size() > 1) {
     document["notes"].push_back(
-        fmt::format("The 3D view shows kick {} of {}, counted from 0; marks of the others are "
-                    "drawn in it, too.",
-                    shown, runs.kicks.size()));
+        fmt::format("The 3D view shows kick {} of kicks 0 to {}; marks of the others are drawn in it, too.", shown,
+                    runs.kicks.size() - 1));
   }
   io::write_text(path, report::page(source_of(kicked, setup, kick), report::results_of(document, path), again,
                                     made_by(again), &beside));

@@ -423,6 +423,9 @@ void add_run(CLI::App& program, Work& work) {
   CLI::App* const command = program.add_subcommand("run", "simulate a scene; with --check, judge every frame");
   add_scene(*command, options->scene);
   add_backend(*command, options->backend, "backend under test");
+  add_check_depth(*command, options->check, "judge every frame by every property and by the scene's expectations")
+      ->expected(0, 1);
+  add_report_option(*command, options->report);
   command->add_option("--mesh", options->mesh, "closed surface mesh that replaces the scene's body")->type_name("FILE");
   add_unit(*command, options->unit)->needs("--mesh");
   command->add_flag("--repair", options->repair, "repair the mesh if it bounds no solid, and report the changes")
@@ -436,8 +439,6 @@ void add_run(CLI::App& program, Work& work) {
       ->needs("--repair");
   add_count(*command, "--frames", options->frames,
             "stop after this many frames; expectations beyond them are not judged", whole_number(0));
-  add_check_depth(*command, options->check, "judge every frame by every property and by the scene's expectations")
-      ->expected(0, 1);
   command
       ->add_option("--against", options->against,
                    fmt::format("compare every stage with this backend: {}", harness::reference_backend().name))
@@ -461,7 +462,6 @@ void add_run(CLI::App& program, Work& work) {
       ->type_name("F");
   add_json(*command, options->json, "write verdicts, stage times and counts as JSON");
   add_junit(*command, options->junit);
-  add_report_option(*command, options->report);
   command
       ->add_option("--preview", options->preview,
                    "only write a page for a browser that shows the body and the blade's path")

@@ -53,7 +53,9 @@ std::vector<Row> rows_of(const std::vector<Verdict>& verdicts, const Shown& show
     row->checked += verdict.checked;
     row->undecided += verdict.undecided;
     if (row->vacuous.empty()) row->vacuous = verdict.vacuous;
-    if (verdict.checked > 0 && verdict.bound > 0 && std::isfinite(verdict.bound)) {
+    // What demands at least its bound has no room to lose.
+    if (verdict.checked > 0 && verdict.bound > 0 && std::isfinite(verdict.bound) &&
+        (!verdict.holds || verdict.measured < verdict.bound)) {
       row->of_bound = std::max(row->of_bound, verdict.measured / verdict.bound);
     }
     const bool worse = row->worst == nullptr || (row->worst->holds && !verdict.holds) ||
@@ -99,7 +101,8 @@ std::string name_of_row(const Row& row, const Shown& shown) {
 }
 
 std::string measured_and_bound(const Verdict& verdict) {
-  return fmt::format("measured {}, bound {}", io::in_unit(figure(verdict.measured), verdict.unit),
+  const bool is_count = verdict.unit == "1" && verdict.bound == 0;
+  return fmt::format("{} {}, bound {}", is_count ? "counted" : "measured", io::in_unit(figure(verdict.measured), verdict.unit),
                      io::in_unit(figure(verdict.bound), verdict.unit));
 }
 
@@ -167,7 +170,6 @@ void print_table(const std::vector<Row>& rows, const Shown& shown) {
 void print_holding(const std::vector<Row>& rows, const Shown& shown) {
   std::set<std::string> wrong;
   std::vector<oracles::AfterStage> counted_rows;
-  int64_t verdicts = 0;
   const Row* nearest = nullptr;
   for (const Row& row : rows) {
     if (row.failed + row.expected > 0) wrong.insert(row.any->property);
@@ -178,18 +180,18 @@ void print_holding(const std::vector<Row>& rows, const Shown& shown) {
   for (const Row& row : rows) {
     if (row.looked == 0 || wrong.contains(row.any->property) || oracles::is_of_the_judging(row.any->property)) continue;
     if (is_expectation(row)) {
-      expected.push_back(fmt::format("{}: {}", row.any->property.substr(oracles::kExpectation.size()),
+      // A no-break space: a value stays with its name.
+      expected.push_back(fmt::format("{}:\u00A0{}", row.any->property.substr(oracles::kExpectation.size()),
                                      io::in_unit(figure(row.any->measured), row.any->unit)));
       continue;
     }
-    verdicts += row.looked;
     const bool tells = row.of_bound > 0 && !oracles::asks_wider(row.any->property);
     if (tells && (nearest == nullptr || row.of_bound > nearest->of_bound)) nearest = &row;
   }
   if (!expected.empty()) say("\n{}: {}.\n", holding("As the scene expects"), listed(expected));
   if (right == 0) return;
-  say("{}{} {}, in {}", expected.empty() ? "\n" : "", plural(right, "property", "properties"),
-      right == 1 ? holding("holds") : holding("hold"), plural(verdicts, "verdict", "verdicts"));
+  say("{}{} {}", expected.empty() ? "\n" : "", plural(right, "property", "properties"),
+      right == 1 ? holding("holds") : holding("hold"));
   if (nearest != nullptr) {
     say("; the nearest to its bound: {}, at {} of it", name_of_row(*nearest, shown), io::share_of(nearest->of_bound));
   }

@@ -47,26 +47,27 @@ void put_edges(Body& body, const Edges& edges) {
 
 double plausible_spacing(const Body& body) {
   std::vector<double> lengths;
-  Vec3 low{1, 1, 1}, high;
-  low = low * std::numeric_limits<double>::infinity();
-  high = Vec3{} - low;
+  const auto add = [&](double length) {
+    if (length > 0 && std::isfinite(length)) lengths.push_back(length);
+  };
   for (int32_t i = 0; i < body.particle_count(); ++i) {
-    for (const int32_t other : body.neighbours(i)) {
-      if (const double length = body.rest_length(i, other); length > 0) lengths.push_back(length);
-    }
-    if (!is_finite(body.rest[at(i)])) continue;
-    for (int axis = 0; axis < 3; ++axis) {
-      low[axis] = std::min(low[axis], body.rest[at(i)][axis]);
-      high[axis] = std::max(high[axis], body.rest[at(i)][axis]);
+    for (const int32_t other : body.neighbours(i)) add(body.rest_length(i, other));
+  }
+  if (lengths.empty()) {
+    // Of some particles how far the nearest other one is.
+    constexpr int32_t kSome = 64;
+    for (int32_t i = 0; i < body.particle_count(); i += body.particle_count() / kSome + 1) {
+      double nearest = std::numeric_limits<double>::infinity();
+      for (const Vec3 other : body.rest) {
+        if (const double length = norm(other - body.rest[at(i)]); length > 0) nearest = std::min(nearest, length);
+      }
+      add(nearest);
     }
   }
-  if (!lengths.empty()) {
-    const auto middle = lengths.begin() + std::ssize(lengths) / 2;
-    std::nth_element(lengths.begin(), middle, lengths.end());
-    return *middle;
-  }
-  const double size = norm(high - low) / std::cbrt(static_cast<double>(body.particle_count()));
-  return size > 0 && std::isfinite(size) ? size : 1;
+  if (lengths.empty()) return 1;
+  const auto middle = lengths.begin() + std::ssize(lengths) / 2;
+  std::nth_element(lengths.begin(), middle, lengths.end());
+  return *middle;
 }
 
 RunStates::RunStates(std::function<io::RunSegments()> open, const JudgedRun& judged)

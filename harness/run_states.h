@@ -10,7 +10,7 @@
 
 namespace cutproof::harness {
 
-// Spacing of particles where none is given [m]: the median edge, or as if the particles filled their box.
+// Spacing of particles where none is given [m]: the median edge, or the median distance to the nearest particle.
 double plausible_spacing(const Body& body);
 
 class RunStates {

@@ -3,6 +3,7 @@
 
 #include "model/io/columns.h"
 #include "model/left_stages.h"
+#include "property_tests/coverage_classes.h"
 #include "report/document_fields.h"
 
 namespace cutproof::report {
@@ -11,6 +12,11 @@ namespace {
 
 std::string cases_in_words(int64_t count) {
   return fmt::format("{} {}", io::grouped(count), count == 1 ? "case" : "cases");
+}
+
+bool occurs_at_rest(const std::string& name) {
+  return std::any_of(property_tests::kCoverageClasses.begin(), property_tests::kCoverageClasses.end(),
+                     [&](const auto& one) { return one.name == name && one.occurs == property_tests::Occurs::always; });
 }
 
 void add_coverage(Sheet& sheet, const Field& document, bool moves) {
@@ -26,7 +32,7 @@ void add_coverage(Sheet& sheet, const Field& document, bool moves) {
     const std::string name = each.key();  // clang captures no binding
     const nlohmann::json& value = each.value();
     const int64_t count = Field{&value, coverage.file, coverage.path + "." + name, coverage.remedy}.count();
-    if (count == 0 && !moves) continue;
+    if (count == 0 && !moves && !occurs_at_rest(name)) continue;
     grid.rows.push_back({{name, io::grouped(count)}, count == 0 ? "warn" : ""});
     if (name == "uncoupled without promise" && count > 0) {
       sheet.notes.push_back(

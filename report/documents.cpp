@@ -188,13 +188,13 @@ void add_measurement(Sheet& sheet, const Field& document) {
   if (holds.is_there()) sheet.holds = holds.flag();
   if (!is_complete) sheet.holds = false;
   sheet.badge = !is_complete ? "incomplete" : !sheet.holds ? "measured" : *sheet.holds ? "holds" : "fails";
-  for (const char* const fact : {"backend", "device", "date"}) {
-    const std::string text = document[fact].text();
-    sheet.facts.push_back(std::string(fact) == "backend" ? "backend " + text : text);
-  }
-  if (document["commit"].is_there()) sheet.facts.push_back("commit " + document["commit"].text());
-  sheet.facts.push_back("cutproof " + document["cutproof"].text());
+  sheet.facts.push_back("backend " + document["backend"].text());
   sheet.again = document["again"].text_or("");
+  // "2026-11-27T19:56:01Z" as pages write it.
+  std::string date = document["date"].text();
+  if (date.size() == 20 && date[10] == 'T') date = date.substr(0, 10) + " " + date.substr(11, 5) + " UTC";
+  sheet.made = {document["cutproof"].text(), sheet.again, date, document["device"].text(),
+                document["commit"].text_or("")};
   if (!is_complete)
     sheet.notes.push_back("The measurement was stopped before its end: this is what there was by then.");
 }

@@ -130,7 +130,12 @@ void add_verdicts(const Field& document, Results& results) {
     return of_a != of_b ? of_a < of_b : of_a == 2 && a.of_bound.value_or(-1) > b.of_bound.value_or(-1);
   });
   std::stable_sort(results.findings.begin(), results.findings.end(), [](const Finding& a, const Finding& b) {
-    return std::tuple(a.is_expected, a.frame, a.stage) < std::tuple(b.is_expected, b.frame, b.stage);
+    // Of one moment first what names a place.
+    const auto has_none = [](const Finding& one) {
+      return one.clusters.empty() && one.particles.empty() && one.path.empty() && one.triangles.empty();
+    };
+    return std::tuple(a.is_expected, a.frame, a.stage, has_none(a)) <
+           std::tuple(b.is_expected, b.frame, b.stage, has_none(b));
   });
   if (results.findings.size() > kMostFindings) {
     results.findings_left_out += static_cast<int64_t>(results.findings.size() - kMostFindings);

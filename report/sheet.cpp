@@ -87,6 +87,7 @@ json to_json(const Sheet& sheet) {
           {"summary", sheet.summary},   {"holds", sheet.holds ? json(*sheet.holds) : json(nullptr)},
           {"badge", sheet.badge},       {"facts", sheet.facts},
           {"notes", sheet.notes},       {"again", sheet.again},
+          {"made", sheet.made ? report::to_json(*sheet.made) : json()},
           {"cards", std::move(cards)},  {"cardsLeftOut", sheet.cards_left_out},
           {"pieces", std::move(pieces)}};
 }

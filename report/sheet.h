@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "report/html.h"
 #include "report/results.h"
 
 namespace cutproof::report {
@@ -74,6 +75,7 @@ struct Sheet {
   std::string badge;           // the same in a word or two
   std::vector<std::string> facts, notes;
   std::string again;  // the command that repeats it; empty: it is not known
+  std::optional<Made> made;  // how what it shows was measured; nothing: when the page was made
   std::vector<Card> cards;
   int64_t cards_left_out = 0;
   std::vector<Piece> pieces;

@@ -39,10 +39,8 @@ constexpr const char* kRemedy = "Copy all files of the recording again, or recor
 hdf5::File open_part(const std::string& path, const char* kind) {
   std::error_code no_status;
   if (!std::filesystem::exists(path, no_status)) {
-    const bool companion = std::string_view(kind) != kIndexKind;
     throw InputError(path, "", "There is no such file.",
-                     companion ? "Keep the files of a recording (index, particles, skin) in one folder."
-                               : "Give the name of a recording, with or without \".cutproof.h5\".");
+                     "Keep the files of a recording (index, particles, skin) in one folder.");
   }
   require_regular_file(path);
   constexpr std::array<char, 8> kSignature = {'\x89', 'H', 'D', 'F', '\r', '\n', '\x1a', '\n'};
@@ -167,10 +165,14 @@ struct RecordingReader::File {
 RecordingReader::File::File(const std::string& name) {
   const RecordingPaths paths = recording_paths(name);
   index_path = paths.index;
+  std::error_code no_status;
+  if (!std::filesystem::exists(paths.index, no_status)) {
+    throw InputError(name, "", "There is no such file.",
+                     "Give the name of a recording, with or without \".cutproof.h5\".");
+  }
   index = {paths.index, open_part(paths.index, kIndexKind), &budget};
   particles = {paths.particles, open_part(paths.particles, kParticlesKind), &budget};
   skin = {paths.skin, open_part(paths.skin, kSkinKind), &budget};
-  std::error_code no_status;
   if (std::filesystem::exists(paths.blade, no_status)) {
     blade = Part{paths.blade, open_part(paths.blade, kBladeKind), &budget};
   }

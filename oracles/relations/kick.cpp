@@ -494,7 +494,7 @@ Verdict answers_are_equal(const KickedRuns& runs, const std::map<std::size_t, Ce
     verdict.bound = within;
     if (holds) continue;
     const auto who = [&](std::size_t k) {
-      return fmt::format("the centre of piece {} by {:.6g} m (kick {})", *report.kicks[k].kicked_piece, way(k), k);
+      return fmt::format("the centre of piece {} by {:.4g} m (kick {})", *report.kicks[k].kicked_piece, way(k), k);
     };
     verdict.witness.text = fmt::format(
         "kicks that are stated to be equal are answered otherwise: in frame {} {}, and {}", f, who(most), who(least));

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -213,6 +214,7 @@ class RunJudge::Implementation {
     RunPieces made;
     if (!tissue_) return made;
     const SweptTissue::Pieces apart = tissue_->apart(), together = tissue_->together();
+    made.of_cells = by_cells();
     made.units = std::ssize(apart.label);
     made.at_first = pieces_at_first_;
     made.pieces = apart.count;
@@ -687,6 +689,21 @@ class RunJudge::Implementation {
     return label;
   }
 
+  // Two particles of one group that lie in different pieces; -1 if there are none, as of cells.
+  std::array<int32_t, 2> parted_in_a_group(const SweptTissue::Pieces& apart) const {
+    for (std::size_t g = 0; !by_cells() && g + 1 < coupling_.offsets.size(); ++g) {
+      int32_t first = -1;
+      for (auto k = at(coupling_.offsets[g]); k < at(coupling_.offsets[g + 1]); ++k) {
+        const int32_t i = coupling_.members[k];
+        const bool is_joined = coupling_.weights.empty() || std::abs(coupling_.weights[k]) > header_.u;
+        if (!is_joined || apart.label[at(i)] < 0 || tissue_->is_beside(i)) continue;
+        if (first >= 0 && apart.label[at(first)] != apart.label[at(i)]) return {first, i};
+        first = i;
+      }
+    }
+    return {-1, -1};
+  }
+
   void partitions() {
     const std::vector<int32_t> label = coupled();
     const SweptTissue::Pieces apart = tissue_->apart();
@@ -699,8 +716,10 @@ class RunJudge::Implementation {
       const auto [known, is_new] = piece_of.emplace(component, piece);
       if (is_new) {
         unit_of[component] = unit;
-      } else if (known->second != piece) {
-        ++across;
+      } else if (known->second != piece && ++across == 1) {
+        if (const auto [a, b] = parted_in_a_group(apart); a >= 0)
+          fail(kAcross, {{}, {a, b}}, "particles {} and {} are coupled by one group in frame {}, and {}", a, b, frame_,
+               has_blade_ ? "the blade has parted them" : "no tissue joins them");
         fail(kAcross, {{}, {unit_particle(unit_of[component]), unit_particle(unit)}},
              "particles {} and {} are coupled in frame {}, and {}", unit_particle(unit_of[component]),
              unit_particle(unit), frame_, has_blade_ ? "the blade has parted them" : "no tissue joins them");

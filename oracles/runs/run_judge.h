@@ -12,6 +12,7 @@ namespace cutproof::oracles {
 
 // How the tissue fell apart, by the blade's sweep alone.
 struct RunPieces {
+  bool of_cells = false;                                // units of tissue are cells; else particles
   int64_t units = 0, at_first = 0;                      // pieces before anything was cut
   int64_t pieces = 0, at_most = 0;                      // that surely are, and that may be
   std::vector<int64_t> sizes;                           // of the sure ones, descending

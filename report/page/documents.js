@@ -1,7 +1,7 @@
 // The page of documents that are no run: campaigns, measurements, counterexamples.
 import { chart, stack } from './charts.js';
 import { grid } from './documents_table.js';
-import { badge, byId, count, element, plural, sayMade } from './dom.js';
+import { badge, byId, count, element, madeFacts, plural, sayMade } from './dom.js';
 import { Sceneries } from './scenery.js';
 import { sourceNodes } from './sources.js';
 import { command } from './verdicts.js';
@@ -33,7 +33,7 @@ function failures(sheet, sceneries, first) {
 
 // A sheet whose page shows others too has a heading of its own.
 function put(main, sheet, isAlone, sceneries, first) {
-  if (!isAlone) main.append(element('header', { class: 'sheet' }, element('h2', { class: 'sheet-title', text: `${sheet.kind}: ${sheet.title}` }), element('p', {}, badgeOf(sheet), element('span', { text: sheet.summary })), element('p', { class: 'muted', text: sheet.facts.join(' · ') })));
+  if (!isAlone) main.append(element('header', { class: 'sheet' }, element('h2', { class: 'sheet-title', text: `${sheet.kind}: ${sheet.title}` }), element('p', {}, badgeOf(sheet), element('span', { text: sheet.summary })), element('p', { class: 'muted', text: [...sheet.facts, ...(sheet.made ? madeFacts(sheet.made) : [])].join(' · ') })));
   const judges = sheet.kind === 'campaign' || sheet.kind === 'judged plugin';
   const isPictured = sceneries && sheet.cards.some((one) => one.picture >= 0);
   if (sheet.cards.length) {
@@ -69,8 +69,8 @@ export async function showDocuments(data) {
   document.title = `${worst === null ? '' : worst ? 'Holds: ' : 'Fails: '}${first.title} · cutproof report`;
   byId('title').textContent = isAlone || sheets.slice(1).every((one) => one.kind === 'campaign') ? `${first.kind[0].toUpperCase()}${first.kind.slice(1)}: ${first.title}` : plural(sheets.length, first.kind);
   byId('summary').append(...(isAlone ? [badgeOf(first), element('span', { text: first.summary })] : [element('span', { text: worst === null ? '' : worst ? 'Everything on this page holds.' : 'Not everything on this page holds.' })]));
-  byId('facts').textContent = isAlone ? first.facts.join(' · ') : '';
-  sayMade(data.made);
+  byId('facts').textContent = isAlone ? first.facts.filter((fact) => fact !== `cutproof ${data.made.program}`).join(' · ') : '';
+  sayMade((isAlone && first.made) || data.made);
   const skip = document.querySelector('.skip');
   skip.remove();
   const main = document.querySelector('main');

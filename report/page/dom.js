@@ -18,11 +18,13 @@ export const byId = (id) => document.getElementById(id);
 
 export const count = (n) => n.toLocaleString('en-US');
 export const plural = (n, one, many) => `${count(n)} ${n === 1 ? one : many || one + 's'}`;
-// When, where and by which command a page was made.
-export function sayMade({ program, date, machine, commit, command }) {
-  const facts = [date, machine, commit && `commit ${commit}`, `cutproof ${program}`].filter(Boolean);
-  byId('made').append(element('span', { text: `Made ${facts.join(' · ')}` }), command && ' · ', command && element('code', { text: command }));
+export const madeFacts = ({ program, date, machine, commit }) => [date, machine, commit && `commit ${commit}`, `cutproof ${program}`].filter(Boolean);
+// When, where and by which command what a page shows was made.
+export function sayMade(made) {
+  byId('made').append(element('span', { text: `Made ${madeFacts(made).join(' · ')}` }), made.command && ' · ', made.command && element('code', {}, ...unbroken(made.command)));
 }
+// Parts of a text: no option breaks behind its dashes.
+export const unbroken = (text) => text.split(/((?<![\w-])--?[a-z][\w-]*)/).map((part, k) => (k % 2 ? element('span', { class: 'option', text: part }) : part)).filter(Boolean);
 // Three digits that matter, without a tail of zeros.
 export function figure(x) {
   if (x === 0) return '0';

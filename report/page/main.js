@@ -3,7 +3,7 @@ import { Moments } from './coding.js';
 import { colourings, rampStops } from './colours.js';
 import { apartInWords, comparisonCard } from './compare.js';
 import { showDocuments } from './documents.js';
-import { badge, byId, count, drawing, element, figure, icon, plural, sayMade } from './dom.js';
+import { badge, byId, count, drawing, element, figure, icon, plural, sayMade, unbroken } from './dom.js';
 import { hasPlace, markedWords, marksOf } from './marks.js';
 import { plotsOf } from './plots.js';
 import { openLinked } from './sources.js';
@@ -188,7 +188,7 @@ async function update() {
   const apart = apartInWords(comparison, moment);
   if (apart) facts.push(apart);
   say(status, element('strong', { text: words(moment) }), element('span', { class: 'muted', text: ` · ${facts.join(' · ')}` }));
-  witness.textContent = found ? `${found.property} fails here: ${found.text}` : '';
+  witness.replaceChildren(...(found ? unbroken(`${found.property} fails here: ${found.text}`) : []));
   showInPlots();
   document.documentElement.dataset.moment = state.at;
   if (!view) return;
@@ -324,7 +324,7 @@ function findings() {
   if (data.findingsLeftOut > 0) section.append(element('p', { class: 'muted', text: `${plural(data.findingsLeftOut, 'later failure')} of the same properties are counted in the table, and not shown.` }));
   section.append(element('h3', { text: data.checked ? 'See it again' : 'Judge it' }), command(data.again));
   const notes = [...data.notReached.map((text) => `Not reached: ${text}`), ...data.notes];
-  if (notes.length) section.append(element('h3', { text: 'Good to know' }), element('ul', { class: 'notes' }, ...notes.map((text) => element('li', { text }))));
+  if (notes.length) section.append(element('h3', { text: 'Good to know' }), element('ul', { class: 'notes' }, ...notes.map((text) => element('li', {}, ...unbroken(text)))));
 }
 
 function about() {

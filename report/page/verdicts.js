@@ -1,12 +1,12 @@
 // What fails, each with its witness; and a table of every property.
-import { count, element, icon, plural } from './dom.js';
+import { count, element, icon, plural, unbroken } from './dom.js';
 import { hasPlace } from './marks.js';
 import { nameNode, sourceNodes } from './sources.js';
 
 const withUnit = (text, unit) => (unit ? `${text} ${unit}` : text);
 
 export function command(text) {
-  const code = element('code', { class: 'command', tabindex: 0, text });
+  const code = element('code', { class: 'command', tabindex: 0 }, ...unbroken(text));
   const said = element('span', { class: 'muted', role: 'status' });
   const copy = element('button', { type: 'button', text: 'Copy', onclick: async () => {
     getSelection().selectAllChildren(code);
@@ -97,11 +97,11 @@ export function cards(data, show) {
     const first = data.findings[members[0]];
     const button = (k, text) => element('button', { type: 'button', class: 'finding', 'data-finding': k, 'aria-pressed': 'false', text, onclick: () => show(k) });
     const row = data.rows.find((one) => one.property === first.property && one.stage === first.stage);
-    const text = element('p', { class: 'witness', text: first.text || 'It has no witness.' });
+    const text = element('p', { class: 'witness' }, ...unbroken(first.text || 'It has no witness.'));
     found.push(element('article', { class: `card ${first.expected ? 'warn' : 'bad'}` },
       element('h3', {}, nameNode(first.property, data.command), !data.foreign && element('span', { class: 'muted', text: ` after ${first.stage}` })),
       text,
-      element('p', { class: 'muted small' }, first.measured !== 'nothing' && element('span', {}, `Measured ${withUnit(first.measured, first.unit)}, bound ${withUnit(first.bound, first.unit)} (`, ...sourceNodes(first.source), '). '),
+      element('p', { class: 'muted small' }, first.measured !== 'nothing' && element('span', {}, `${first.bound === '0' && !first.unit ? 'Counted' : 'Measured'} ${withUnit(first.measured, first.unit)}, bound ${withUnit(first.bound, first.unit)} (`, ...sourceNodes(first.source), '). '),
         element('span', { text: row && row.failed + row.expected > 1 ? `It fails in ${count(row.failed + row.expected)} of ${plural(row.judged, 'verdict')}.` : '' }),
         first.expected && element('span', { text: ' The scene expects it to fail.' })),
       element('div', { class: 'row' }, button(members[0], isLone ? 'Show me' : hasPlace(first.marks) ? `Show me: frame ${first.frame}` : `Go to frame ${first.frame}`)),

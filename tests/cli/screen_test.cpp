@@ -254,7 +254,7 @@ TEST_F(Screen, JudgesWhatARunReachesThatStopsEarly) {
             std::string::npos)
       << outcome.output;
   EXPECT_NE(outcome.output.find("0 failed: what was reached holds."), std::string::npos) << outcome.output;
-  EXPECT_NE(on_one_line(outcome.output).find("As the scene expects: particles: 150."), std::string::npos)
+  EXPECT_NE(on_one_line(outcome.output).find("As the scene expects: particles:\u00A0150."), std::string::npos)
       << outcome.output;
   EXPECT_NE(read("run.xml").find("not reached"), std::string::npos);
   // Its recording is one of a run that stops early.
