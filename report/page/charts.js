@@ -2,10 +2,11 @@
 // over or focused, and every plot has a table that says the same.
 import { byNumber } from './documents_table.js';
 import { drawing, element, figure } from './dom.js';
-import { ticks } from './plots.js';
+import { ticks, widthFor } from './plots.js';
 
-const kWidth = 560, kHeight = 300, kLeft = 66, kRight = 16, kTop = 14, kBottom = 44;
+const kWidth = widthFor(560), kHeight = 300, kLeft = 66, kRight = 16, kTop = 14, kBottom = 44;
 const right = kWidth - kRight, bottom = kHeight - kBottom;
+const kLetters = Math.floor(kWidth / 7.2);  // of a bar's name
 const kShapes = 6;  // and colours
 
 const isThere = (v) => v !== null && typeof v === 'number';
@@ -159,7 +160,7 @@ export function stack(given) {
   svg.append(drawing('text', { class: 'axis', x: (12 + right) / 2, y: height - 8, 'text-anchor': 'middle', text: `time [${given.unit}]` }));
   given.labels.forEach((label, k) => {
     const y = kTop + row * k;
-    svg.append(drawing('text', { class: 'bar-name', x: 12, y: y + 14, text: label.length > 78 ? `${label.slice(0, 77)}…` : label }));
+    svg.append(drawing('text', { class: 'bar-name', x: 12, y: y + 14, text: label.length > kLetters ? `${label.slice(0, kLetters - 1)}…` : label }));
     let before = 0;
     given.parts.forEach((part, s) => {
       const value = part.values[k] || 0;

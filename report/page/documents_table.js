@@ -3,13 +3,14 @@ import { count, element, icon } from './dom.js';
 import { nameNode, sourceNodes } from './sources.js';
 import { exactWords, folded } from './verdicts.js';
 
+const kLong = 40;  // letters of a cell that needs a wide column
 export const byNumber = (isNumber) => (isNumber ? 'number' : null);
 
 export function grid(given) {
   const rows = given.rows.map((row) => {
     const words = row.cells[given.filter];
     const cell = (text, k) => (k > 0 ? sourceNodes(text) : [icon(row.kind), row.kind === 'warn' && '! ', given.columns[0][0] === 'property' ? nameNode(text) : text]);
-    const node = element('tr', { class: row.kind || null }, ...row.cells.map((text, k) => element(k === 0 ? 'th' : 'td', { scope: k === 0 ? 'row' : null, class: byNumber(given.columns[k][1]) }, ...cell(text, k))));
+    const node = element('tr', { class: row.kind || null }, ...row.cells.map((text, k) => element(k === 0 ? 'th' : 'td', { scope: k === 0 ? 'row' : null, class: byNumber(given.columns[k][1]) || (text.length > kLong && k > 0 && 'long') }, ...cell(text, k))));
     return { node, words, isExact: row.kind === 'exact' };
   });
   const nodes = (isExact) => rows.filter((row) => row.isExact === isExact).map((row) => row.node);

@@ -23,8 +23,8 @@ export const madeFacts = ({ program, date, machine, commit }) => [date, machine,
 export function sayMade(made) {
   byId('made').append(element('span', { text: `Made ${madeFacts(made).join(' · ')}` }), made.command && ' · ', made.command && element('code', {}, ...unbroken(made.command)));
 }
-// Parts of a text: no option breaks behind its dashes.
-export const unbroken = (text) => text.split(/((?<![\w-])--?[a-z][\w-]*)/).map((part, k) => (k % 2 ? element('span', { class: 'option', text: part }) : part)).filter(Boolean);
+// Parts of a text: no option and no number breaks behind its dashes.
+export const unbroken = (text) => text.split(/((?<![\w-])--?[a-z][\w-]*|[\d.]+e-\d+)/).map((part, k) => (k % 2 ? element('span', { class: 'whole', text: part }) : part)).filter(Boolean);
 // Three digits that matter, without a tail of zeros.
 export function figure(x) {
   if (x === 0) return '0';

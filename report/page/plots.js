@@ -1,7 +1,9 @@
 // Lines and stacked bars over frames, as SVG, with the same figures as a table below.
 import { count, drawing, element, figure } from './dom.js';
 
-const kWidth = 520, kHeight = 220, kLeft = 58, kRight = 14, kTop = 14, kBottom = 40;
+// A drawing is as wide as a narrow page has room, so that its letters are as large there.
+export const widthFor = (most) => Math.max(Math.min(most, innerWidth - 64), 240);
+const kWidth = widthFor(520), kHeight = 220, kLeft = 58, kRight = 14, kTop = 14, kBottom = 40;
 const kMostBars = 130;
 
 export function ticks(low, high, most) {
@@ -112,15 +114,20 @@ export function plot(options) {
 
 // All plots that the page's data allow.
 export function plotsOf(data, jump) {
-  const found = [];
-  const ends = data.frames;
+  const found = [], { comparison } = data, isBeside = comparison && comparison.shown;
+  const ends = data.frames, whose = isBeside ? `${comparison.ownName}: ` : '';
   const first = (column) => ends[column][0], last = (column) => ends[column][ends[column].length - 1];
   const greatest = (column) => ends[column].reduce((a, b) => Math.max(a, b), 0);
   const least = (column) => ends[column].reduce((a, b) => Math.min(a, b), Infinity);
   const changes = (column, what) => (least(column) === greatest(column)
-    ? `${count(first(column))} ${what} throughout.` : `${count(first(column))} at first, ${count(last(column))} at the end; between ${count(least(column))} and ${count(greatest(column))}.`);
+    ? `${whose}${count(first(column))} ${what} throughout.` : `${whose}${count(first(column))} at first, ${count(last(column))} at the end; between ${count(least(column))} and ${count(greatest(column))}.`);
   if (ends.frame.length > 1) {
-    const lines = (title, column, unit, words) => found.push(plot({ title, words, unit, frames: ends.frame, series: [{ name: unit, values: ends[column] }], kind: 'lines', whole: true, jump }));
+    const other = new Map(isBeside ? data.moments.map((moment, k) => [moment.start ? -1 : moment.frame, data.besideMoments[k]]) : []);
+    const lines = (title, column, unit, words) => {
+      const series = [{ name: isBeside ? comparison.ownName : unit, values: ends[column] }];
+      if (isBeside && column !== 'removed') series.push({ name: comparison.name, values: ends.frame.map((frame) => (other.has(frame) ? other.get(frame)[column] : null)) });
+      found.push(plot({ title, words, unit, frames: ends.frame, series, kind: 'lines', whole: true, jump }));
+    };
     if (data.hasPieces) lines('Pieces of tissue', 'components', 'pieces', changes('components', first('components') === 1 ? 'piece' : 'pieces'));
     const groups = data.foreign ? 'coupling groups' : 'clusters';
     if (greatest('clusters') > 0) lines(data.foreign ? 'Coupling groups' : 'Clusters', 'clusters', groups, changes('clusters', groups));

@@ -882,7 +882,7 @@ TEST_F(RecordingTest, IsRefusedIfItIsNoneAtAll) {
   const auto refused = [&](const std::string& name, const std::string& why) {
     expect_input_error([&] { RecordingReader reader(path(name)); }, path(name + ".cutproof.h5"), why);
   };
-  refused("missing", "no such file");
+  expect_input_error([&] { RecordingReader reader(path("missing")); }, path("missing"), "no such file");
   fs::create_directory(path("folder.cutproof.h5"));
   refused("folder", "a folder");
   write_bytes(path("empty.cutproof.h5"), "");
