@@ -137,11 +137,29 @@ TEST(ShownVerdicts, CountNoPropertyThatOnlySaysThatEnoughWasJudged) {
     one->bound = 1;
   }
   const std::string text = printed({property, gate, whole});
-  for (const char* const words : {"1 property holds, in 1 verdict;", "momentum after step", "at 0.25 of it."})
+  for (const char* const words : {"1 property holds;", "momentum after step", "at 0.25 of it."})
     EXPECT_NE(text.find(words), std::string::npos) << text;
   gate.holds = false;
   gate.witness.text = "nothing";
   EXPECT_NE(printed({property, gate}).find("FAILS: something was judged, in frame 0"), std::string::npos);
+}
+
+// What demands at least its bound holds by being there: nothing is as near to it as that.
+TEST(ShownVerdicts, TakeWhatDemandsItsBoundForNoNearMiss) {
+  Verdict met = failing_verdict("the kick was felt", Stage::skin, 0, ""), near = failing_verdict("motion", Stage::step, 0, "");
+  met.holds = near.holds = true;
+  met.measured = met.bound = near.bound = 1;
+  near.measured = 0.25;
+  EXPECT_NE(printed({met, near}).find("nearest to its bound: motion after step, at 0.25 of it"), std::string::npos)
+      << printed({met, near});
+}
+
+TEST(ShownVerdicts, CountWhatHasNoUnitAndNoBound) {
+  Verdict counted = failing_verdict("finite", Stage::skin, 0, "a");
+  counted.unit = "1";
+  counted.measured = 20;
+  counted.bound = 0;
+  EXPECT_NE(printed({counted}).find("counted 20, bound 0"), std::string::npos) << printed({counted});
 }
 
 TEST(ShownVerdicts, SayOneOnlyOfWhatIsExactlyAtItsBound) {

@@ -387,6 +387,21 @@ TEST(RunJudge, TellsAVibrationThatFramesDoNotResolveFromATeleport) {
   EXPECT_TRUE(is_without_teleport(0.01, 3.99 * 1e-5));
 }
 
+// The witness is where the pieces are joined, and not the first particle of each.
+TEST(RunJudge, NamesTwoParticlesOfTheGroupThatJoinsWhatTheBladeHasParted) {
+  Bar bar;
+  for (std::size_t f = 5; f < Bar::kFrames; ++f) {
+    bar.coupling[f].members.insert(bar.coupling[f].members.end(), {7, 22});
+    bar.coupling[f].offsets.push_back(std::ssize(bar.coupling[f].members));
+  }
+  const std::vector<Verdict> verdicts = bar.verdicts();
+  const auto across = std::find_if(verdicts.begin(), verdicts.end(),
+                                   [](const Verdict& v) { return v.property == "no coupling across pieces"; });
+  ASSERT_NE(across, verdicts.end());
+  ASSERT_FALSE(across->holds);
+  EXPECT_EQ(across->witness.particles, (std::vector<int32_t>{7, 22})) << across->witness.text;
+}
+
 struct Fault {
   const char *name, *property;
   std::function<void(Bar&)> plant;

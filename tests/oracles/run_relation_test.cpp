@@ -155,6 +155,8 @@ TEST(RunRelation, RejectsOneParticleThatIsBeyondTheBound) {
       const Judged judged = judge(word, a, b, noise);
       EXPECT_EQ(judged.failed(), Names{"related positions"}) << word;
       EXPECT_EQ(judged.of("related positions").witness.particles, std::vector<int32_t>{11}) << word;
+      const std::string text = judged.of("related positions").witness.text;
+      EXPECT_NE(text.find(" m: "), std::string::npos) << "a bound without its unit: " << text;
       EXPECT_EQ(judged.of("related positions").frame, 7) << word;
       EXPECT_NEAR(judged.of("related positions").measured, 1e-11, 1e-12) << word;
     }

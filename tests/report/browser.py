@@ -144,7 +144,7 @@ class Browser:
         self.shown(moment)
 
     def pixels_of(self, selector):
-        """Of each of these views every pixel, as a sum; how many are not of its ground, and how many are marked. Of
+        """Of each of these views every pixel, as a sum; how many are not of its ground, at its rim as well, and how many are marked. Of
         the sharp pictures, which come after quick ones, and of all in one moment in which none is due."""
         end = time.monotonic() + 60
         while (seen := self.ask("""
@@ -156,13 +156,17 @@ class Browser:
             const pen = copy.getContext('2d');
             pen.drawImage(canvas, 0, 0);
             const all = pen.getImageData(0, 0, copy.width, copy.height).data;
-            let drawn = 0, sum = 0, orange = 0;
+            let drawn = 0, sum = 0, orange = 0, rim = 0;
             for (let i = 0; i < all.length; i += 4) {
-              if (all[i] !== all[0] || all[i + 1] !== all[1] || all[i + 2] !== all[2]) ++drawn;
+              if (all[i] !== all[0] || all[i + 1] !== all[1] || all[i + 2] !== all[2]) {
+                const x = (i / 4) % copy.width, y = Math.floor(i / 4 / copy.width);
+                ++drawn;
+                rim += x === 0 || y === 0 || x === copy.width - 1 || y === copy.height - 1;
+              }
               if (all[i] > 150 && all[i] > 1.6 * all[i + 1] && all[i + 2] < 40) ++orange;
               sum = (Math.imul(sum, 31) + all[i] + 7 * all[i + 1] + 13 * all[i + 2]) | 0;
             }
-            return {sum, share: drawn / (all.length / 4), orange};
+            return {sum, share: drawn / (all.length / 4), orange, rim};
           });""", selector)) is None:
             assert time.monotonic() < end, f"{selector} is not drawn within 60 s"
             time.sleep(0.02)

@@ -48,7 +48,7 @@ json campaign(const std::vector<json>& properties, const std::vector<json>& viol
           {"violations", violations},
           {"left_to_reference", json::array()},
           {"holds", violations.empty()},
-          {"coverage", {{"boxes", 40}, {"uncoupled without promise", 3}, {"wall", 0}}}};
+          {"coverage", {{"boxes", 40}, {"uncoupled without promise", 3}, {"cavity", 0}, {"wall", 0}}}};
 }
 
 const Grid& grid_of(const Sheet& sheet, std::size_t k) { return std::get<Grid>(sheet.pieces.at(k)); }
@@ -63,6 +63,19 @@ TEST(ACampaign, WithoutViolationSaysSoPlainly) {
   EXPECT_EQ(properties.rows.at(0).cells.at(7), "2 of 27") << "what is undecidable within rounding is said";
   EXPECT_EQ(properties.rows.at(1).cells.at(2), "nothing to look at");
   EXPECT_NE(sheet.notes.at(0).find("2 of the things"), std::string::npos);
+}
+
+// What was not met comes first; what needs bodies that move is not asked of others.
+TEST(ACampaign, ListsEachClassThatItsCasesShouldHaveMet) {
+  json document = campaign({property("coverage", 0)});
+  const auto classes = [&] {
+    std::vector<std::string> names;
+    for (const GridRow& row : grid_of(sheet_of(document, "f"), 1).rows) names.push_back(row.cells.at(0));
+    return names;
+  };
+  EXPECT_EQ(classes(), (std::vector<std::string>{"cavity", "boxes", "uncoupled without promise"}));
+  document["dynamics"] = true;
+  EXPECT_EQ(classes(), (std::vector<std::string>{"cavity", "wall", "boxes", "uncoupled without promise"}));
 }
 
 TEST(ACampaign, SaysWhichStagesWereLeftToTheReference) {
@@ -147,6 +160,18 @@ json tuning(const json& found) {
                     {trial(8, 0.01, 8.0, "within"), trial(4, 0.05, 4.0, "within"), trial(6, 0.06, 6.0, "within"),
                      trial(1, 0.4, 1.0, "over"), trial(2, 0.2, std::nullopt, "over")}}});
   return document;
+}
+
+TEST(AMeasurement, SaysWhenAndWhereItWasMadeAndByWhichCommand) {
+  json document = tuning(nullptr);
+  document.update({{"date", "2026-11-27T19:56:01Z"}, {"again", "cutproof tune it"}, {"commit", "0123456789ab"}});
+  const Sheet sheet = sheet_of(document, "f");
+  ASSERT_TRUE(sheet.made);
+  EXPECT_EQ(to_json(*sheet.made), (json{{"program", "1"},
+                                        {"command", "cutproof tune it"},
+                                        {"date", "2026-11-27 19:56 UTC"},
+                                        {"machine", "a CPU"},
+                                        {"commit", "0123456789ab"}}));
 }
 
 TEST(ATuning, ShowsAllThatWasTriedItsFrontAndTheAnswer) {

@@ -160,6 +160,15 @@ TEST(Results, CountEachPropertyOnceAfterHoweverManyStages) {
             "all 2 expectations of the scene are met; 'near' fails in frame 0 after merge.");
 }
 
+// A page opens at the first finding: of one moment at one that marks something.
+TEST(Results, BeginOfOneMomentWithWhatNamesAPlace) {
+  json nowhere = verdict("equal answers", "skin", 9, false, 2, 1);
+  nowhere["witness"] = {{"text", "two differ"}, {"clusters", json::array()}, {"particles", json::array()}, {"path", json::array()}};
+  const Results results = results_of(document({nowhere, verdict("no ghost force", "skin", 9, false, 2, 1)}), "f");
+  EXPECT_EQ(results.findings.at(0).property, "no ghost force");
+  EXPECT_EQ(results.findings.at(1).property, "equal answers");
+}
+
 TEST(Results, BeginWithWhatFailsFirst) {
   const Results results =
       results_of(document({verdict("momentum", "step", 0, true, 0.1, 1), verdict("exactness", "split", 0, false, 2, 1),
@@ -386,6 +395,8 @@ TEST(Pictures, OfAStateWithoutSenseAreDrawnAllTheSame) {
                            state.frame = index;
                            state.x[0].x = std::nan("");
                            state.x[1].y = 1e300;
+                           state.x[2].z = std::nan("");
+                           state.alive[2] = 0;
                            state.skin.position = {{0, 0, 0}, {0, std::nan(""), 0}};
                            state.skin.owner = {-4, 5000};
                            state.skin.direction = {0, 9};
@@ -394,7 +405,7 @@ TEST(Pictures, OfAStateWithoutSenseAreDrawnAllTheSame) {
                            return snapshot;
                          }};
   const Pictures pictures = pictures_of(source, {finding_in(500)}, kMostPictureBytes);
-  EXPECT_EQ(pictures.own.details.at(1).at("nowhere"), 2);
+  EXPECT_EQ(pictures.own.details.at(1).at("nowhere"), 2) << "who is gone is not missed";
   // The body's 2 h, and the skin's vertex one spacing before it; rounded once or twice.
   EXPECT_LE(pictures.own.loss, 3.0 / 65'534 / 2 * (1 + 1e-12)) << "what is far away costs the others no places";
   EXPECT_FALSE(pictures.marks.at(0).is_exact);

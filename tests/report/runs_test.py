@@ -46,6 +46,7 @@ with Browser(path) as page:
     marks = page.data("findings[0].marks")
     assert marks["particles"] == first["witness"]["particles"] and marks["exact"], marks
     assert page.pixels()["orange"] > 0, "the witness is not seen"
+    assert page.pixels()["rim"] == 0, "a small body is not seen whole"
     page.unfold()
     table = page.text("#verdicts")
     assert not any(f"after {stage}" in table for stage in ("step", "skin")), table
@@ -68,6 +69,15 @@ with Browser(path) as page:
     page.driver.find_element(By.ID, "play").click()
     page.until("return document.documentElement.dataset.moment == arguments[0]", document["run"]["frames"] - 1)
 
+
+# A narrow page folds what a wide one folds.
+with Browser(path, width=800) as page:
+    hidden = page.driver.find_element(By.CSS_SELECTOR, "#verdicts tbody[hidden] tr")
+    assert not hidden.is_displayed(), "rows behind a fold are seen"
+    page.unfold()
+    assert hidden.is_displayed(), "a fold does not open"
+    assert page.driver.find_element(By.CSS_SELECTOR, "#verdicts td:last-child a").is_displayed()
+
 # --- One that holds opens where the blade has parted tissue last, and shows what it swept ---
 
 simulate("tetrahedra", "holds")
@@ -87,6 +97,22 @@ with Browser(path) as page:
     assert "2 pieces" in page.text("#status"), page.text("#status")
     for plot in page.driver.find_elements(By.CSS_SELECTOR, ".plot"):
         assert "as loaded" not in plot.text, plot.text
+    # The whole body is in the view, also when its pieces have flown apart.
+    page.driver.find_element(By.ID, "way").click()
+    page.ask("[...document.querySelectorAll('#view button')].find((b) => b.textContent === 'Whole body').click()")
+    assert page.pixels()["rim"] == 0, "the whole body is not within the view"
+
+# What fails without a place dims nothing.
+simulate("clusters", "stale", "--fault", "stale_index")
+path, document = page_of("stale", 1)
+with Browser(path) as page:
+    first = page.data("findings[0]")
+    assert not any(first["marks"][name] for name in ("particles", "path", "members", "corners")), first
+    page.shown(first["marks"]["moment"], 0)
+    seen = page.pixels()["sum"]
+    page.scrub(0)
+    page.scrub(first["marks"]["moment"])
+    assert page.pixels()["sum"] == seen, "a verdict that names no place dims the view"
 
 # --- Particles that come later, and a skin of its own ---
 
@@ -184,6 +210,7 @@ for name, leak, status in (("alone", 0, 0), ("leaks", 1e-3, 1)):
         assert "cutproof judged the kicks of" in page.text("#summary"), page.text("#summary")
         assert "the run without a kick" in page.text("#legend") and "2 pieces" in page.text("#status")
         assert "0.6 s" in page.text("#status") or not leak
+        assert page.data("body.spacing") == 1, "h is no distance of neighbours"
         if leak:
             assert page.data("findings[0].property") == "no ghost force" and page.pixels()["orange"] > 0
         moved = page.data("moments.map((moment) => moment.apart.max > 0)")
@@ -195,7 +222,7 @@ for name, leak, status in (("alone", 0, 0), ("leaks", 1e-3, 1)):
 x = numpy.stack(numpy.meshgrid(*3 * [numpy.arange(4.0)], indexing="ij"), 3).reshape(-1, 3) * 0.01
 order = numpy.random.default_rng(2).permutation(len(x))
 for name, map_, off, status in (("mapped", "units:4,1,1", 0, 0), ("strays", "units:4,1,1", 1e-3, 1),
-                                ("mixed", "permute", 0, 0)):
+                                ("mixed", "permute", 0, 0), ("far", "units:4,1,1", 1e3, 1)):
     with cutproof_run.Writer(work / f"{name}_a.h5", rest=x, spacing=0.01, promises="free") as a, \
          cutproof_run.Writer(work / f"{name}_b.h5", rest=4 * x if map_ != "permute" else x[order],
                              spacing=0.04 if map_ != "permute" else 0.01, promises="free",
@@ -203,12 +230,13 @@ for name, map_, off, status in (("mapped", "units:4,1,1", 0, 0), ("strays", "uni
         for frame in range(5):
             now = x + [0, 0, 1e-3 * frame ** 2]
             other = (4 * now if map_ != "permute" else now[order]).copy()
-            other[7, 0] += off * (frame == 3)
-            a.frame(now, time=0.1 * frame, groups=[range(32), range(32, 64)])
+            other[7 if off < 1 else slice(None), 0] += off * (frame == 3)
+            quad = [[[0.01, 0.01, 0.01 * z + 0.015] for z in (frame, frame, frame + 1)] + [[0.02, 0.01, 0.01 * frame]]]
+            a.frame(now, time=0.1 * frame, groups=[range(32), range(32, 64)], blade=numpy.array(quad))
             groups = [range(32), range(32, 64)]
             if map_ == "permute":
                 groups = [numpy.flatnonzero(order >= 32), numpy.flatnonzero(order < 32)]
-            b.frame(other, time=0.1 * frame, groups=groups)
+            b.frame(other, time=0.1 * frame, groups=groups, blade=numpy.array(quad) * (4 if map_ != "permute" else 1))
     work.run([program, "relate", f"{name}_a.h5", f"{name}_b.h5", "--map", map_, "--report", f"{name}.html"], status)
     with Browser(work / f"{name}.html") as page:
         assert "cutproof judged whether these correspond" in page.text("#summary"), page.text("#summary")
@@ -216,10 +244,33 @@ for name, map_, off, status in (("mapped", "units:4,1,1", 0, 0), ("strays", "uni
         assert sides == [f"{name}_a.h5", f"{name}_b.h5"], sides
         apart = page.data("moments.map((moment) => moment.apart.max)")
         assert [one > 1e-9 for one in apart] == [False, False, False, off > 0, False], apart
-        if off:
+        assert all(f"{name}_{run}.h5" in page.text(".plot .legend") for run in "ab")
+        if name == "far":
+            page.scrub(3)
+            for where in ("#status", ".side.other"):
+                assert "64 particles not drawn: far outside" in page.text(where), page.text(where)
+            page.scrub(2)
+            assert page.text(".side.other") == "far_b.h5", page.text(".side.other")
+        elif off:
             page.shown(3, 0)
             assert "They differ" in page.text("#comparison") and page.pixels()["orange"] > 0
+            # A colour is one distance, whatever somebody has looked at before.
+            page.scrub(2)
+            before = page.text("#legend"), page.pixels()["sum"]
+            page.scrub(3)
+            page.scrub(2)
+            assert (page.text("#legend"), page.pixels()["sum"]) == before
+            # The blade's way is not drawn over marks, in neither run.
+            page.driver.find_element(By.CSS_SELECTOR, "[data-finding='0']").click()
+            page.shown(3, 0)
+            seen = page.pixels()["sum"]
+            page.driver.find_element(By.ID, "way").click()
+            page.shown(3, 0)
+            assert page.pixels()["sum"] == seen, "one of the runs shows the way beside marks"
         else:
             assert "decide differently" not in page.text("#comparison"), page.text("#comparison")
         page.picture(work / f"{name}.png")
+    for width in (320, 360, 390):
+        with Browser(work / f"{name}.html", width=width) as page:
+            assert page.ask("return document.documentElement.scrollWidth <= window.innerWidth"), f"wider than {width} pixels"
 print("pages of runs are as they should be")
