@@ -173,7 +173,9 @@ void add_relate(CLI::App& program, Work& work) {
   command->add_option("files", options->files, "runs, the first of which the others are compared with")
       ->required()
       ->type_name("RUN");
-  auto* const map = command->add_option("--map", options->map, "how they correspond: same, reset, checkpoint, units:4,1,1, mirror:x, rotate:90z, shift:X,Y,Z, boost:X,Y,Z, permute, split or refine");
+  auto* const map = command->add_option("--map", options->map,
+                                        "how they correspond: same, reset, checkpoint, units:4,1,1, mirror:x, "
+                                        "rotate:90z, shift:X,Y,Z, boost:X,Y,Z, permute, split or refine");
   map->type_name("WORD");
   auto* const make = command->add_option("--make", options->make,
                                          "write the input that corresponds: of the first file, to the second");

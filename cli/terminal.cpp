@@ -102,7 +102,8 @@ std::string name_of_row(const Row& row, const Shown& shown) {
 
 std::string measured_and_bound(const Verdict& verdict) {
   const bool is_count = verdict.unit == "1" && verdict.bound == 0;
-  return fmt::format("{} {}, bound {}", is_count ? "counted" : "measured", io::in_unit(figure(verdict.measured), verdict.unit),
+  return fmt::format("{} {}, bound {}", is_count ? "counted" : "measured",
+                     io::in_unit(figure(verdict.measured), verdict.unit),
                      io::in_unit(figure(verdict.bound), verdict.unit));
 }
 

@@ -228,7 +228,8 @@ void add_extent(json& detail, const State& state, const Box& outer) {
   });
   const Vec3 middle = sum / static_cast<double>(std::max<int64_t>(count, 1));
   each([&](Vec3 x, bool is_drawn) {
-    for (int axis = 0; axis < 3 && is_drawn; ++axis) half[axis] = std::max(half[axis], std::abs(x[axis] - middle[axis]));
+    for (int axis = 0; axis < 3 && is_drawn; ++axis)
+      half[axis] = std::max(half[axis], std::abs(x[axis] - middle[axis]));
   });
   detail["nowhere"] = nowhere;
   if (count > 0) {
@@ -445,12 +446,9 @@ json least_and_greatest(const std::vector<uint8_t>& codes) {
 
 json apart_json(const Apart& apart, const Kept& kept) {
   const bool is_kept = apart.where >= 0 && std::binary_search(kept.particle.begin(), kept.particle.end(), apart.where);
-  return {{"max", json_number(apart.max)},
-          {"rms", json_number(apart.rms)},
-          {"particle", apart.where},
-          {"place", is_kept ? kept.place[at(apart.where)] : -1},
-          {"differs", apart.differs},
-          {"codes", least_and_greatest(apart.codes)}};
+  return {{"max", json_number(apart.max)}, {"rms", json_number(apart.rms)},
+          {"particle", apart.where},       {"place", is_kept ? kept.place[at(apart.where)] : -1},
+          {"differs", apart.differs},      {"codes", least_and_greatest(apart.codes)}};
 }
 
 // Pictures of one of the two runs at these moments. `other`: the one beside it, to which the distance is measured; null

@@ -83,12 +83,17 @@ json to_json(const Sheet& sheet) {
   }
   for (const Piece& piece : sheet.pieces)
     pieces.push_back(std::visit([](const auto& one) { return to_json(one); }, piece));
-  return {{"kind", sheet.kind},         {"title", sheet.title},
-          {"summary", sheet.summary},   {"holds", sheet.holds ? json(*sheet.holds) : json(nullptr)},
-          {"badge", sheet.badge},       {"facts", sheet.facts},
-          {"notes", sheet.notes},       {"again", sheet.again},
+  return {{"kind", sheet.kind},
+          {"title", sheet.title},
+          {"summary", sheet.summary},
+          {"holds", sheet.holds ? json(*sheet.holds) : json(nullptr)},
+          {"badge", sheet.badge},
+          {"facts", sheet.facts},
+          {"notes", sheet.notes},
+          {"again", sheet.again},
           {"made", sheet.made ? report::to_json(*sheet.made) : json()},
-          {"cards", std::move(cards)},  {"cardsLeftOut", sheet.cards_left_out},
+          {"cards", std::move(cards)},
+          {"cardsLeftOut", sheet.cards_left_out},
           {"pieces", std::move(pieces)}};
 }
 

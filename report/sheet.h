@@ -74,7 +74,7 @@ struct Sheet {
   std::optional<bool> holds;   // nothing: it judges nothing
   std::string badge;           // the same in a word or two
   std::vector<std::string> facts, notes;
-  std::string again;  // the command that repeats it; empty: it is not known
+  std::string again;         // the command that repeats it; empty: it is not known
   std::optional<Made> made;  // how what it shows was measured; nothing: when the page was made
   std::vector<Card> cards;
   int64_t cards_left_out = 0;

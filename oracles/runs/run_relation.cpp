@@ -357,8 +357,9 @@ class RunRelation::Implementation {
                                             : "what rounds, unless the motion makes more of it "
                                               "(--noise says by how much)";
     if (particle >= 0) {
-      fail(which, {{}, {particle}}, "particle {} is off by {:.4g} {} in frame {}; right runs are by at most {:.4g} {}: {}",
-           particle, measured, kNames[which].unit, frame_, bound, kNames[which].unit, why);
+      fail(which, {{}, {particle}},
+           "particle {} is off by {:.4g} {} in frame {}; right runs are by at most {:.4g} {}: {}", particle, measured,
+           kNames[which].unit, frame_, bound, kNames[which].unit, why);
     } else {
       fail(which, {}, "it is off by {:.4g} {} in frame {}; right runs are by at most {:.4g} {}: {}", measured,
            kNames[which].unit, frame_, bound, kNames[which].unit, why);

@@ -674,11 +674,12 @@ TEST_F(Program, TellsItsVersionBackendsAndSceneFields) {
   std::string line, screen;
   for (int k = 0; k < 24 && std::getline(help, line); ++k) screen += line + '\n';
   for (const char* const option : {"\n  --check ", "\n  --report "})
-    EXPECT_EQ(screen.find(option) != std::string::npos, option != std::string("\n  --report ") || CUTPROOF_HAS_PAGES != 0)
+    EXPECT_EQ(screen.find(option) != std::string::npos,
+              option != std::string("\n  --report ") || CUTPROOF_HAS_PAGES != 0)
         << screen;
   const std::string relate = cutproof("relate --help").output;
-  for (const char* const map : {"same", "reset", "checkpoint", "units:", "mirror:", "rotate:", "shift:", "boost:",
-                                "permute", "split", "refine"})
+  for (const char* const map : {"same", "reset", "checkpoint",
+                                "units:", "mirror:", "rotate:", "shift:", "boost:", "permute", "split", "refine"})
     EXPECT_NE(relate.find(map), std::string::npos) << map;
 }
 

@@ -146,7 +146,8 @@ TEST(ShownVerdicts, CountNoPropertyThatOnlySaysThatEnoughWasJudged) {
 
 // What demands at least its bound holds by being there: nothing is as near to it as that.
 TEST(ShownVerdicts, TakeWhatDemandsItsBoundForNoNearMiss) {
-  Verdict met = failing_verdict("the kick was felt", Stage::skin, 0, ""), near = failing_verdict("motion", Stage::step, 0, "");
+  Verdict met = failing_verdict("the kick was felt", Stage::skin, 0, ""),
+          near = failing_verdict("motion", Stage::step, 0, "");
   met.holds = near.holds = true;
   met.measured = met.bound = near.bound = 1;
   near.measured = 0.25;

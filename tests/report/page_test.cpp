@@ -163,7 +163,8 @@ TEST(Results, CountEachPropertyOnceAfterHoweverManyStages) {
 // A page opens at the first finding: of one moment at one that marks something.
 TEST(Results, BeginOfOneMomentWithWhatNamesAPlace) {
   json nowhere = verdict("equal answers", "skin", 9, false, 2, 1);
-  nowhere["witness"] = {{"text", "two differ"}, {"clusters", json::array()}, {"particles", json::array()}, {"path", json::array()}};
+  nowhere["witness"] = {
+      {"text", "two differ"}, {"clusters", json::array()}, {"particles", json::array()}, {"path", json::array()}};
   const Results results = results_of(document({nowhere, verdict("no ghost force", "skin", 9, false, 2, 1)}), "f");
   EXPECT_EQ(results.findings.at(0).property, "no ghost force");
   EXPECT_EQ(results.findings.at(1).property, "equal answers");
