@@ -1,7 +1,7 @@
 // The page of documents that are no run: campaigns, measurements, counterexamples.
 import { chart, stack } from './charts.js';
 import { grid } from './documents_table.js';
-import { badge, byId, count, element, madeFacts, plural, sayMade } from './dom.js';
+import { badge, byId, count, element, madeFacts, plural, sayMade, unbroken } from './dom.js';
 import { Sceneries } from './scenery.js';
 import { sourceNodes } from './sources.js';
 import { command } from './verdicts.js';
@@ -46,7 +46,7 @@ function put(main, sheet, isAlone, sceneries, first) {
   }
   if (sheet.again || sheet.notes.length) {
     main.append(element('section', { class: 'card notes-card' }, sheet.again && element('h2', { text: 'Repeat it' }), sheet.again && command(sheet.again),
-      sheet.notes.length > 0 && element('h2', { text: 'Good to know' }), sheet.notes.length > 0 && element('ul', { class: 'notes' }, ...sheet.notes.map((text) => element('li', { text })))));
+      sheet.notes.length > 0 && element('h2', { text: 'Good to know' }), sheet.notes.length > 0 && element('ul', { class: 'notes' }, ...sheet.notes.map((text) => element('li', {}, ...unbroken(text))))));
   }
   let plots = null;
   for (const piece of sheet.pieces) {

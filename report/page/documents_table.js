@@ -1,5 +1,5 @@
 // Tables of documents, which may be filtered by what stands in one of their columns.
-import { count, element, icon } from './dom.js';
+import { count, element, icon, unbroken } from './dom.js';
 import { nameNode, sourceNodes } from './sources.js';
 import { exactWords, folded } from './verdicts.js';
 
@@ -30,7 +30,7 @@ export function grid(given) {
       fold.forEach((part, k) => { part.hidden = (k === 0) === (event.target.value !== ''); });
       say(n);
     } }, element('option', { value: '', text: 'all' }), ...values.map((text, k) => element('option', { value: String(k), text: text || '–' }))));
-  return element('section', { class: 'card' }, element('h3', { text: given.title }), given.words && element('p', { class: 'muted', text: given.words }),
+  return element('section', { class: 'card' }, element('h3', { text: given.title }), given.words && element('p', { class: 'muted' }, ...unbroken(given.words)),
     element('div', { class: 'row' }, filter, shown),
     element('div', { class: 'scroll rows', tabindex: 0, role: 'region', 'aria-label': given.title }, element('table', {},
       element('thead', {}, element('tr', {}, ...given.columns.map(([text, isNumber]) => element('th', { scope: 'col', class: byNumber(isNumber), text })))),
