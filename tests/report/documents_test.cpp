@@ -70,7 +70,8 @@ TEST(ACampaign, ListsEachClassThatItsCasesShouldHaveMet) {
   json document = campaign({property("coverage", 0)});
   const auto classes = [&] {
     std::vector<std::string> names;
-    for (const GridRow& row : grid_of(sheet_of(document, "f"), 1).rows) names.push_back(row.cells.at(0));
+    const Sheet sheet = sheet_of(document, "f");
+    for (const GridRow& row : grid_of(sheet, 1).rows) names.push_back(row.cells.at(0));
     return names;
   };
   EXPECT_EQ(classes(), (std::vector<std::string>{"cavity", "boxes", "uncoupled without promise"}));

@@ -241,7 +241,7 @@ for name, map_, off, status in (("mapped", "units:4,1,1", 0, 0), ("strays", "uni
     with Browser(work / f"{name}.html") as page:
         assert "cutproof judged whether these correspond" in page.text("#summary"), page.text("#summary")
         sides = [one.text for one in page.driver.find_elements(By.CSS_SELECTOR, ".side")]
-        assert sides == [f"{name}_a.h5", f"{name}_b.h5"], sides
+        assert sides[0] == f"{name}_a.h5" and sides[1].startswith(f"{name}_b.h5"), sides
         apart = page.data("moments.map((moment) => moment.apart.max)")
         assert [one > 1e-9 for one in apart] == [False, False, False, off > 0, False], apart
         assert all(f"{name}_{run}.h5" in page.text(".plot .legend") for run in "ab")
