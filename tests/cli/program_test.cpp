@@ -324,7 +324,7 @@ TEST_F(Program, AnotherNumberOfParticlesIsNotHeldAgainstTheScenes) {
     EXPECT_EQ(outcome.status, 0) << outcome.output;
     const json document = json::parse(read("out.json"));
     EXPECT_TRUE(has_note(document, "The expected number of particles and clusters was not judged"));
-    EXPECT_NE(outcome.output.find("components at the end: 2"), std::string::npos) << outcome.output;
+    EXPECT_NE(outcome.output.find("components at the end:\u00A02"), std::string::npos) << outcome.output;
     const Outcome checked = cutproof("check seen");
     EXPECT_EQ(checked.status, 0) << checked.output;
   }

@@ -191,7 +191,7 @@ TEST_F(Screen, ShowsWhatFailsFirstWithTheFrameInWhichItBegan) {
   ASSERT_GT(failing, 1) << "the scene has to fail in several frames";
   const std::string printed = on_one_line(outcome.output);
   const std::string head = "FAILS: isolation after " + stage + ", first in frame " + std::to_string(first) + " (" +
-                           std::to_string(failing) + " of " + std::to_string(all) + " verdicts) measured ";
+                           std::to_string(failing) + " of " + std::to_string(all) + " verdicts) counted ";
   ASSERT_NE(printed.find(head), std::string::npos) << head << "\n" << outcome.output;
   EXPECT_NE(printed.find(on_one_line(witness)), std::string::npos) << witness << "\n" << outcome.output;
   EXPECT_LT(printed.find("FAILS: isolation"), printed.find("; the nearest to its bound"));
