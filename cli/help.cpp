@@ -16,7 +16,10 @@ std::size_t begin_of_explanation(const std::string& line) {
   const std::size_t name = std::min(line.find_first_not_of(' '), line.size());
   if (name == 0) return 2;  // prose, or "Usage: …"
   const std::size_t gap = line.find("  ", name);
-  return gap == std::string::npos ? name : std::min(line.find_first_not_of(' ', gap), line.size());
+  if (gap != std::string::npos) return std::min(line.find_first_not_of(' ', gap), line.size());
+  // A name that fills its column leaves a single space.
+  constexpr std::size_t kColumn = 30;  // CLI11's
+  return line.size() > kColumn && line[kColumn - 1] == ' ' ? kColumn : name;
 }
 
 // Fits a terminal of 24 lines. Tests and shells read the text after "Subcommands:".

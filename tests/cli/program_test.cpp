@@ -681,6 +681,8 @@ TEST_F(Program, TellsItsVersionBackendsAndSceneFields) {
   for (const char* const map : {"same", "reset", "checkpoint",
                                 "units:", "mirror:", "rotate:", "shift:", "boost:", "permute", "split", "refine"})
     EXPECT_NE(relate.find(map), std::string::npos) << map;
+  const std::size_t begin = relate.rfind('\n', relate.find("mirror:x")) + 1;
+  EXPECT_EQ(relate.find_first_not_of(' ', begin) - begin, 30) << "an explanation leaves its column:\n" << relate;
 }
 
 TEST_F(Program, ListsEveryPropertyThatARunIsJudgedByWithItsSourceAndWhenItApplies) {
