@@ -27,7 +27,7 @@ json error_of_stage(Stage stage, const Measured& measured) {
   json error;
   if (stage == Stage::step && judged.step) {
     error = to_json(judged.step->position);
-    error["undecidable"] = judged.step->undecidable;
+    error["not_compared"] = judged.step->undecidable;
   } else if (stage == Stage::detect && judged.detect) {
     const auto& [removed, differing, within_rounding] = *judged.detect;
     error = {{"removed", removed}, {"differing", differing}, {"within_rounding", within_rounding}};
@@ -89,7 +89,7 @@ std::string in_words(const json& error, const std::string& nothing) {
   const auto some = [&](const char* field) { return error.value(field, 0.0) > 0; };
   say(error.contains("max_h"), "{max_h:.2g} h max, {rms_h:.2g} h RMS");
   say(some("beyond"), "{beyond} beyond 1e-04 h");  // oracles::kPositionsWanted
-  say(some("undecidable"), "{undecidable} undecidable within rounding");
+  say(some("not_compared"), "{not_compared} inconclusive within rounding");
   say_whether("triangles_equal", "triangles equal", "triangles NOT equal");
   say(error.contains("removed"), "{differing} of {removed} removals differ");
   if (some("differing")) say_whether("within_rounding", "all within rounding", "NOT all within rounding");

@@ -49,7 +49,7 @@ def lockstep(documents):
         rows.append({"scene": document["scene"], "particles": document["body"]["particles"],
                      "holds": document["against"]["holds"], "frames": len(document["frames"]),
                      "topology_differences": sum(run["frames"]["topology_differences"]),
-                     "positions_undecidable": sum(run["frames"]["positions_undecidable"]), "greatest": run["greatest"]})
+                     "positions_not_compared": sum(run["frames"]["positions_not_compared"]), "greatest": run["greatest"]})
     write("cpu_lockstep_host", {"command": "cutproof run SCENE --backend host --against reference --mode lockstep",
                                 "left_out": "verdicts, what each frame did"}, "scenes", rows)
 

@@ -46,7 +46,7 @@ judge_under() {
     "$1" "$work/$1.log" "$here" > "$work/guest"
   chmod +x "$work/guest"
   rm -f "$work/$1.log"
-  CUTPROOF_GUEST="$work/guest" cutproof judge "guests/$2.so" --cases 60 --time-limit 120 --simplify 0 --save "$work" || true
+  CUTPROOF_GUEST="$work/guest" cutproof judge "guests/$2.so" --cases 60 --time-limit 120 --shrink 0 --save "$work" || true
   cat "$work/$1.log"
   grep -q "$3" "$work/$1.log"
 }

@@ -20,7 +20,7 @@ LONG = (
     (r"Organs/.*", "a mesh of others that cannot be repaired, or a scene on it that fails"),
     (r".*SavedCounterexamples/(simulated|host)_.*", "an order of threads in which a saved case fails again"),
     (r"Over/LargeBodies\..*/host_blocks", "room for lists that runs out in blocks of threads alone"),
-    (r"PluginBackend\.IsFoundAndSimplifiedWhereOneStageIsWrong", "a guest's wrong stage that is not simplified"),
+    (r"PluginBackend\.IsFoundAndSimplifiedWhereOneStageIsWrong", "a guest's wrong stage that is not shrunk"),
     (r"RepairOfOne\.(MakesEveryOutsideMeshASolid|JoinsTwoOfVeryManyParts)", "a mesh that is repaired wrongly, or slowly"),
     (r"RecordedValues\.AreEachHeldAgainstTheOthersOrJudged", "a recorded value of which no verdict would notice a change"),
     (r".*/FaultySimulator\..*", "a fault of a whole simulator that the judge of a scene accepts"),

@@ -194,12 +194,12 @@ def errors(read):
     last = [levels[-1]["apart_h"] for levels in limits.values()]
     known = [known_to(read(f"cpu_tune_retarded_{scene}")) for scene in CUT_SCENES]
     known = [value for value in known if value is not None]
-    total = random_steps["particles"] + random_steps["undecidable"]
+    total = random_steps["particles"] + random_steps["not_compared"]
     return table(["error", "size", "depends on"], [
         ["implementation: single precision beside the double-precision reference, one frame",
          f"scenes: at most {figure(max(one['greatest']['position']['max'] for one in lockstep))} h; random cases: at most "
          f"{figure(random_steps['greatest_h'])} h in {random_steps['steps']:,} steps, without "
-         f"{percent(random_steps['undecidable'], total)} of positions, which rounding can carry farther",
+         f"{percent(random_steps['not_compared'], total)} of positions, which rounding can carry farther",
          "stiffness, contacts"],
         ["solver: as given beside the same substeps solved",
          f"a substep: {figure(max(one['rms_h'] for one in solved))} h RMS at most, "

@@ -56,11 +56,11 @@ json lockstep_json(const harness::Lockstep& lockstep) {
     norm(std::string(oracles::kMeasures[m].key), [m](const LockstepFrame& f) { return f.errors[m]; });
   }
   column("topology_differences", [](const LockstepFrame& f) { return f.topology_differences; });
-  column("removals_undecidable", [](const LockstepFrame& f) { return f.undecidable.removals; });
+  column("removals_not_compared", [](const LockstepFrame& f) { return f.undecidable.removals; });
   column("decisions_taken_otherwise", [](const LockstepFrame& f) { return f.undecidable.otherwise; });
-  column("positions_undecidable", [](const LockstepFrame& f) { return f.undecidable.positions; });
-  column("rotations_undecidable", [](const LockstepFrame& f) { return f.undecidable.rotations; });
-  column("positions_undecided", [](const LockstepFrame& f) { return f.undecidable.undecided; });
+  column("positions_not_compared", [](const LockstepFrame& f) { return f.undecidable.positions; });
+  column("rotations_not_compared", [](const LockstepFrame& f) { return f.undecidable.rotations; });
+  column("positions_inconclusive", [](const LockstepFrame& f) { return f.undecidable.inconclusive; });
   return {{"frames", std::move(frames)}, {"greatest", worst_json(lockstep)}};
 }
 
@@ -107,7 +107,7 @@ void print_lockstep(const harness::Lockstep& lockstep) {
   say("{:>8} decisions of steps that differ from the reference's\n", undecidable.otherwise);
   say("{:>8} positions that rounding carries beyond the bound: not measured, but judged\n", undecidable.positions);
   say("{:>8} rotations, the same\n", undecidable.rotations);
-  say("{:>8} positions that rounding carries so far that they are not judged sharply\n", undecidable.undecided);
+  say("{:>8} positions that rounding carries so far that they are not judged sharply\n", undecidable.inconclusive);
 }
 
 void print_free_running(const harness::FreeRunning& run) {

@@ -42,7 +42,7 @@ std::string what_was_found(const Verdict& verdict, const Judging& judging) {
 
 // Of the case that its command shows: the shrunk one, where there is one.
 const json& as_it_is_shown(const json& violation) {
-  const auto simplified = violation.find("simplified");
+  const auto simplified = violation.find("shrunk");
   return simplified != violation.end() && simplified->contains("text") ? *simplified : violation;
 }
 

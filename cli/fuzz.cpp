@@ -1,4 +1,4 @@
-// `cutproof fuzz`: random dissections until one is wrong, and that one simplified.
+// `cutproof fuzz`: random dissections until one is wrong, and that one shrunk.
 #include "cli/fuzz.h"
 
 #include <fmt/format.h>
@@ -117,13 +117,13 @@ void print_coverage(const json& document) {
     say("all {} coverage classes were met, the rarest in {} cases: {}\n", classes, least, rarest);
   } else {
     say("{} of {} coverage classes were met; {}: {}\n", classes - static_cast<int64_t>(empty.size()), classes,
-        undecided("not met"), fmt::join(empty, ", "));
+        inconclusive("not met"), fmt::join(empty, ", "));
   }
 }
 
 // As of a run (terminal.h): what fails first, what holds summed up.
 void print_properties(const json& properties) {
-  Table table({"property", "after", "judged", "failed", "of bound", "undecided"});
+  Table table({"property", "after", "judged", "failed", "of bound", "inconclusive"});
   const json* nearest = nullptr;
   int64_t holds = 0, doubtful = 0;
   std::vector<std::string> failed;
@@ -132,7 +132,7 @@ void print_properties(const json& properties) {
     table.add({printable(io::filled("{property}", each)), printable(io::filled("{stage}", each)),
                io::filled("{judged}", each), io::filled("{failed}", each),
                has_share ? io::share_of(each.at("of_bound").get<double>()) : "-",
-               each.at("undecided") > 0 ? io::filled("{undecided} of {checked}", each) : "-"});
+               each.at("inconclusive") > 0 ? io::filled("{inconclusive} of {checked}", each) : "-"});
     if (each.at("failed") > 0) {
       failed.push_back(printable(io::filled("{property} after {stage} ({failed} of {judged} verdicts)", each)));
     } else if (each.at("judged") > 0) {
@@ -140,7 +140,7 @@ void print_properties(const json& properties) {
       const bool tells = has_share && !oracles::asks_wider(each.at("property").get<std::string>());
       if (tells && (nearest == nullptr || each.at("of_bound") > nearest->at("of_bound"))) nearest = &each;
     }
-    doubtful += each.at("undecided").get<int64_t>();
+    doubtful += each.at("inconclusive").get<int64_t>();
   }
   if (style().verbose) say_as_it_is(table.text());
   if (!failed.empty()) insist("{}: {}\n", failing("what fails"), fmt::join(failed, ", "));
@@ -152,7 +152,7 @@ void print_properties(const json& properties) {
     }
     say("\n");
   }
-  if (doubtful > 0) say("{}: {} things\n", undecided("undecidable within rounding"), io::grouped(doubtful));
+  if (doubtful > 0) say("{}: {} things\n", inconclusive("inconclusive within rounding"), io::grouped(doubtful));
 }
 
 }  // namespace
@@ -162,15 +162,15 @@ void print_campaign(const json& document) {
   print_properties(document.at("properties"));
   if (document.contains("steps_compared")) {
     say_filled(
-        "{steps} steps beside the reference's: {particles} positions at most {greatest_h} h apart, {undecidable} that "
+        "{steps} steps beside the reference's: {particles} positions at most {greatest_h} h apart, {not_compared} that "
         "rounding may carry farther\n",
         document.at("steps_compared"));
   }
   if (const std::vector<std::string> left = document.at("left_to_reference"); !left.empty()) {
-    say("{}\n", undecided(printable(left_in_words(left))));
+    say("{}\n", inconclusive(printable(left_in_words(left))));
   }
   if (document.at("refused") > 0) {
-    say("{}\n", undecided(io::filled("{refused} cases were refused: nothing is known of them", document)));
+    say("{}\n", inconclusive(io::filled("{refused} cases were refused: nothing is known of them", document)));
   }
   const auto grouped = [&](const char* name) { return io::grouped(document.at(name).get<int64_t>()); };
   say("{} cases of {:.0f} particles on average, {} verdicts, {:.1f} s, {} cases/s\n", grouped("cases"),
@@ -187,7 +187,7 @@ int print_conclusion(const json& document, const CampaignConclusion& conclusion)
   } else {
     const bool only_stopped =
         !document.at("complete") && !document.contains("missing_shards") && document.at("violations").empty();
-    insist("{}: {}\n", only_stopped ? undecided("INCOMPLETE") : failing("FAILS"), conclusion.failure);
+    insist("{}: {}\n", only_stopped ? inconclusive("INCOMPLETE") : failing("FAILS"), conclusion.failure);
   }
   return conclusion.holds() ? 0 : 1;
 }
@@ -248,12 +248,12 @@ json keep(const Violation& violation, const FuzzOptions& options, const Campaign
   const std::string file = stem + ".json";
   io::write_text(file, to_json(found) + "\n");
   if (is_late) {
-    insist("not simplified, its time is over; to do that: fuzz again with --seed {} --sizes {}-{} --cases 1{}\n",
+    insist("not shrunk, its time is over; to do that: fuzz again with --seed {} --sizes {}-{} --cases 1{}\n",
            asked.seed + static_cast<uint64_t>(violation.index), size_at(asked, violation.index),
            size_at(asked, violation.index), asked.dynamics ? " --dynamics" : "");
   } else if (simplified.alone) {
     const std::string now = describe(simplified.verdict);
-    insist("simplified to {} and {}{}{}\n", counted(found.failing.strokes.size(), "stroke", "strokes"),
+    insist("shrunk to {} and {}{}{}\n", counted(found.failing.strokes.size(), "stroke", "strokes"),
            counted(found.failing.nodes.size(), "particle", "particles"),
            harness::described_backend(choice.name).takes_schedule
                ? ", " + counted(gpu::preemptions(found.schedule), "preemption", "preemptions")
@@ -274,12 +274,12 @@ json keep(const Violation& violation, const FuzzOptions& options, const Campaign
   if (is_late) return kept;
   kept["drawn"] = size_of(violation.failing);
   if (simplified.alone) {
-    kept["simplified"] = size_of(found.failing);
+    kept["shrunk"] = size_of(found.failing);
     // Another property may fail first in it than in the case as it was drawn.
-    kept["simplified"]["text"] = describe(simplified.verdict);
-    kept["simplified"]["property"] = simplified.verdict.property;
-    kept["simplified"]["stage"] = name_of(simplified.verdict.stage);
-    kept["simplified"]["witness"] = simplified.verdict.witness.text;
+    kept["shrunk"]["text"] = describe(simplified.verdict);
+    kept["shrunk"]["property"] = simplified.verdict.property;
+    kept["shrunk"]["stage"] = name_of(simplified.verdict.stage);
+    kept["shrunk"]["witness"] = simplified.verdict.witness.text;
   }
   return kept;
 }
@@ -355,7 +355,7 @@ int fuzz(const FuzzOptions& options) {
 void add_fuzz(CLI::App& program, Work& work) {
   const auto options = std::make_shared<FuzzOptions>();
   CLI::App* const command =
-      program.add_subcommand("fuzz", "random dissections until one is wrong, and that one simplified");
+      program.add_subcommand("fuzz", "random dissections until one is wrong, and that one shrunk");
   add_backend(*command, options->backend, "backend under test");
   add_count(*command, "--cases", options->cases, "how many (default: 1000)", whole_number(0, kMostCases));
   command->add_option("--seconds", options->campaign.seconds, "for how long")->type_name("S")->check(number_from(0));
@@ -370,8 +370,8 @@ void add_fuzz(CLI::App& program, Work& work) {
   command->add_option("--shard", options->shard, "only part i of N of the cases")->type_name("i/N");
   command->add_flag("--keep-going", options->campaign.keep_going, "beyond the first violation");
   command
-      ->add_option("--simplify", options->simplify,
-                   "how long a violation's case is simplified, within --seconds; 0: not at all")
+      ->add_option("--shrink", options->simplify,
+                   "how long a violation's case is shrunk, within --seconds; 0: not at all")
       ->capture_default_str()
       ->type_name("S")
       ->check(number_from(0));

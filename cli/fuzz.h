@@ -27,7 +27,7 @@ struct FuzzOptions {
   std::vector<std::string> merge;  // results of shards, to be put together; nothing is run
 };
 
-// Runs it, simplifies and saves what is wrong, and says so. The document of docs/reference/schemas/fuzz.json.
+// Runs it, shrinks and saves what is wrong, and says so. The document of docs/reference/schemas/fuzz.json.
 nlohmann::json fuzz_campaign(const FuzzOptions& options);
 // Says what a campaign came to, but not whether it holds as a whole.
 void print_campaign(const nlohmann::json& document);

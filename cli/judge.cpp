@@ -152,15 +152,15 @@ void print_properties(const KernelCampaign& campaign) {
   if (campaign.operation->is_simulator()) print_scenes(campaign);
   print_kinds(campaign);
   for (const Unpromised& u : campaign.unpromised) {
-    say("  {}: {}{}\n", undecided("not promised, not judged"), u.property,
+    say("  {}: {}{}\n", inconclusive("not promised, not judged"), u.property,
         u.failing > 0 ? fmt::format(" (would fail in {} questions)", u.failing) : "");
   }
   for (const NotAsked& each : campaign.not_asked) {
-    say("  {}: {} of size {}: that of size {} took {:.2g} s, and --time-limit may be reached\n", undecided("not asked"),
+    say("  {}: {} of size {}: that of size {} took {:.2g} s, and --time-limit may be reached\n", inconclusive("not asked"),
         each.kind, each.size, each.size_before, each.seconds);
   }
   if (campaign.refused > 0) {
-    say("  {}: {} questions, without a verdict\n", undecided("refused"), campaign.refused);
+    say("  {}: {} questions, without a verdict\n", inconclusive("refused"), campaign.refused);
   }
   if (const std::string why = campaign.untested(); !why.empty()) {
     insist("{}: too little was judged: {}\n", failing("FAILS"), why);
@@ -243,7 +243,7 @@ void add_cases(const json& result, const JudgeOptions& options, std::vector<io::
       const std::string again = failure.at("again");
       each.outcome = io::JunitOutcome::failed;
       each.message = failure.at("text");
-      const std::string now = failure.at("simplified");
+      const std::string now = failure.at("shrunk");
       each.text = fmt::format(
           "{}: {}\n{}to see it again: {}",
           name_of_question(failure.at("index"), failure.value("drawn_size", int64_t{0}), failure.at("kind")),
@@ -424,7 +424,7 @@ int judge(JudgeOptions options) {
     const std::size_t all = asked.size() + (on_stages ? 1 : 0);
     const std::string how_far =
         fmt::format("it was stopped after {} of {} begun", begun, counted(all, "operation was", "operations were"));
-    insist("{}: {}\n", undecided("INCOMPLETE"), how_far);
+    insist("{}: {}\n", inconclusive("INCOMPLETE"), how_far);
     io::JunitCase& stopped = junit.emplace_back(io::JunitCase{kEnoughJudged, kClass});
     stopped.outcome = io::JunitOutcome::error;
     stopped.message = how_far;
@@ -482,7 +482,7 @@ void add_judge(CLI::App& program, Work& work) {
       ->type_name("S")
       ->check(number_between(0.01, 1e6));
   command->add_flag("--keep-going", options->keep_going, "go on after ten unanswered questions");
-  command->add_option("--simplify", options->campaign.simplify, "time for shrinking each failure; 0: none")
+  command->add_option("--shrink", options->campaign.simplify, "time for shrinking each failure; 0: none")
       ->capture_default_str()
       ->type_name("S")
       ->check(number_from(0));

@@ -30,7 +30,7 @@ struct Row {
   const Verdict* any = nullptr;
   const Verdict *first_failing = nullptr, *worst_failing = nullptr, *first_expected = nullptr;
   const Verdict* worst = nullptr;  // the failing one with the greatest measure, or the greatest that holds
-  int64_t verdicts = 0, looked = 0, failed = 0, expected = 0, checked = 0, undecided = 0;
+  int64_t verdicts = 0, looked = 0, failed = 0, expected = 0, checked = 0, inconclusive = 0;
   // The greatest of all frames: the worst figure need not be the one that came nearest to its own bound.
   double of_bound = -1;  // -1: every bound is 0, as it is of what is counted
   std::string vacuous = {};
@@ -51,7 +51,7 @@ std::vector<Row> rows_of(const std::vector<Verdict>& verdicts, const Shown& show
     ++row->verdicts;
     row->looked += verdict.checked > 0 || !verdict.holds;
     row->checked += verdict.checked;
-    row->undecided += verdict.undecided;
+    row->inconclusive += verdict.inconclusive;
     if (row->vacuous.empty()) row->vacuous = verdict.vacuous;
     // What demands at least its bound has no room to lose.
     if (verdict.checked > 0 && verdict.bound > 0 && std::isfinite(verdict.bound) &&
@@ -209,9 +209,9 @@ void print_the_rest(const std::vector<Row>& rows, const Shown& shown) {
       expected.push_back(fmt::format("{} ({} of {} verdicts, first in frame {})", name_of_row(row, shown),
                                      io::grouped(row.expected), io::grouped(row.verdicts), row.first_expected->frame));
     }
-    if (row.undecided > 0) {
+    if (row.inconclusive > 0) {
       unsure.push_back(
-          fmt::format("{} of {} in {}", io::grouped(row.undecided), io::grouped(row.checked), name_of_row(row, shown)));
+          fmt::format("{} of {} in {}", io::grouped(row.inconclusive), io::grouped(row.checked), name_of_row(row, shown)));
     }
   }
   for (const Row& row : rows) {
@@ -219,9 +219,9 @@ void print_the_rest(const std::vector<Row>& rows, const Shown& shown) {
       vacuous.emplace_back(row.any->property, row.vacuous.empty() ? "no reason given" : row.vacuous);
     }
   }
-  if (!expected.empty()) say("{}: {}.\n", undecided("Fails, as the scene expects"), listed(expected));
+  if (!expected.empty()) say("{}: {}.\n", inconclusive("Fails, as the scene expects"), listed(expected));
   print_grouped(lesser("Nothing to look at"), vacuous);
-  if (!unsure.empty()) say("{}: {}.\n", undecided("Undecidable within rounding"), listed(unsure));
+  if (!unsure.empty()) say("{}: {}.\n", inconclusive("Inconclusive within rounding"), listed(unsure));
 }
 
 void print_conclusion(std::size_t verdicts, int64_t failed, bool all, const char* holds) {
@@ -256,13 +256,13 @@ void print_verdicts(const std::vector<Verdict>& verdicts, const Shown& shown) {
 void print_verdicts(const harness::SceneJudge& judge, const std::string& again) {
   print_verdicts(judge.verdicts(), shown_of(judge, again));
   if (!judge.not_reached().empty()) {
-    say("{}: {}.\n", undecided("Not reached, because the run stops before"), listed(judge.not_reached()));
+    say("{}: {}.\n", inconclusive("Not reached, because the run stops before"), listed(judge.not_reached()));
   }
   if (const std::vector<std::string> left = judge.left_to_reference(); !left.empty()) {
-    say("{}\n", undecided(left_in_words(left)));
+    say("{}\n", inconclusive(left_in_words(left)));
   }
   if (!judge.not_its_own().empty()) {
-    say("{}: {}.\n", undecided("Not judged, because only such stages decide it"), listed(judge.not_its_own()));
+    say("{}: {}.\n", inconclusive("Not judged, because only such stages decide it"), listed(judge.not_its_own()));
   }
   std::vector<std::string> unpromised;
   for (const harness::Judge::Unpromised& u : judge.unpromised()) {
@@ -270,7 +270,7 @@ void print_verdicts(const harness::SceneJudge& judge, const std::string& again) 
                                                      io::grouped(u.failing), io::grouped(u.states))
                                        : u.property);
   }
-  if (!unpromised.empty()) say("{}: {}.\n", undecided("Not promised here, so not judged"), listed(unpromised));
+  if (!unpromised.empty()) say("{}: {}.\n", inconclusive("Not promised here, so not judged"), listed(unpromised));
   print_notes(judge.notes_beside_lists());
 }
 

@@ -25,7 +25,7 @@ struct Shown {
 
 // What fails, by property and stage: how often, and the first of them with its frame, its figures and its witness. Then
 // in words what holds, and how near to its bound the nearest came, what fails as it is expected to, what had nothing to
-// look at, what is undecided. With --verbose a table of all rows as well: how often judged, how often it failed, the
+// look at, what is inconclusive. With --verbose a table of all rows as well: how often judged, how often it failed, the
 // worst figure beside its bound, and the greatest share of a bound.
 void print_verdicts(const std::vector<Verdict>& verdicts, const Shown& shown);
 // The same of a run, with what was not reached, what was not promised, and the notes.

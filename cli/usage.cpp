@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <utility>
 #include <string_view>
 
 #include "model/error.h"
@@ -34,10 +35,16 @@ std::string_view letters_of(std::string_view option) {
   return option.substr(std::min(option.find_first_not_of('-'), option.size()));
 }
 
+// Words that people may try, and the field's word.
+constexpr std::pair<std::string_view, std::string_view> kOtherWords[] = {{"simplify", "shrink"}, {"minimize", "shrink"}};
+
 std::string option_meant(const std::string& given, const std::vector<std::string>& names) {
   std::vector<std::string_view> letters;
   for (const std::string& name : names) letters.push_back(letters_of(name));
-  const std::string nearest = nearest_word(letters_of(given), letters);
+  std::string nearest = nearest_word(letters_of(given), letters);
+  for (const auto& [other, word] : kOtherWords) {
+    if (letters_of(given) == other && std::find(letters.begin(), letters.end(), word) != letters.end()) nearest = word;
+  }
   if (nearest.empty()) return "";
   const auto name =
       std::find_if(names.begin(), names.end(), [&](const std::string& n) { return letters_of(n) == nearest; });

@@ -139,19 +139,19 @@ void FreeRunning::see(Stage stage, const State& after) {
   }
   if (auto difference = oracles::difference_of_decisions(expected, after)) {
     FirstDifference& first = end_with(stage, std::move(*difference));
-    const std::vector<int32_t> undecided = oracles::in_one_only(expected.removed, after.removed);
-    if (stage == Stage::detect && !undecided.empty()) {
-      first.what.particles = undecided;
+    const std::vector<int32_t> inconclusive = oracles::in_one_only(expected.removed, after.removed);
+    if (stage == Stage::detect && !inconclusive.empty()) {
+      first.what.particles = inconclusive;
       // Both may be right, each for its own positions.
       first.explained = oracles::detection(setup_, before_, after).holds;
       if (setup_.detect.criterion == Criterion::distance) {
         State present = expected;
         for (const int32_t i : expected.removed) present.alive[at(i)] = 1;
         Closeness farthest{0, 0};
-        for (const int32_t i : undecided) {
+        for (const int32_t i : inconclusive) {
           const Closeness of =
               closeness_of(setup_, present, after, i, frames_.back().position.max, unit_roundoff(after));
-          if (i == undecided.front() || !(of.beyond() <= farthest.beyond())) farthest = of;
+          if (i == inconclusive.front() || !(of.beyond() <= farthest.beyond())) farthest = of;
         }
         first.margin = farthest.margin;
         first.reach = farthest.reach;

@@ -248,7 +248,7 @@ void Judge::see_several(const Moment& moment, const std::array<bool, 6>& seen) {
       // The reference knows one of the rule's answers. The split has one answer, and the oracle identifies merged
       // clusters. Clusters that have grown after that, or lost their numbers at the frame's end, cannot be identified.
       if (sees(Stage::expand) || sees(Stage::skin)) {
-        verdict.undecided = end.clusters.count();
+        verdict.inconclusive = end.clusters.count();
       } else {
         const State split = cut_again(setup_, detected(), Stage::split).state;
         take({oracles::merge_legality(setup_, split, end), oracles::cap_kept(setup_, split, end)}, Stage::merge, end);

@@ -29,14 +29,14 @@ nlohmann::json to_json(const PropertySummary& summary) {
           {"judged", summary.judged},
           {"checked", summary.checked},
           {"failed", summary.failed},
-          {"undecided", summary.undecided},
+          {"inconclusive", summary.inconclusive},
           {"seconds", summary.seconds},
           {"measured", json_number(summary.measured)},
           {"of_bound", json_number(summary.of_bound)}};
 }
 
 void add_summary(nlohmann::json& sum, const nlohmann::json& more) {
-  for (const char* count : {"judged", "checked", "failed", "undecided"}) {
+  for (const char* count : {"judged", "checked", "failed", "inconclusive"}) {
     sum[count] = sum.at(count).get<int64_t>() + more.at(count).get<int64_t>();
   }
   sum["seconds"] = sum.at("seconds").get<double>() + more.at("seconds").get<double>();
@@ -84,7 +84,7 @@ void PropertySummaries::add(const Verdict& verdict, int64_t judged, int64_t fail
   summary.judged += judged;
   summary.checked += verdict.checked;
   summary.failed += failed;
-  summary.undecided += verdict.undecided;
+  summary.inconclusive += verdict.inconclusive;
   summary.seconds += verdict.took.seconds;
   if (verdict.checked == 0) return;
   raise(summary.measured, verdict.measured);
@@ -99,7 +99,7 @@ void PropertySummaries::join(const PropertySummaries& other) {
     ours.judged += theirs.judged;
     ours.checked += theirs.checked;
     ours.failed += theirs.failed;
-    ours.undecided += theirs.undecided;
+    ours.inconclusive += theirs.inconclusive;
     ours.seconds += theirs.seconds;
     raise(ours.measured, theirs.measured);
     raise(ours.of_bound, theirs.of_bound);

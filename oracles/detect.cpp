@@ -85,7 +85,7 @@ constexpr double kSweepBand = 5e-10;
 // A turning sweep has no closed form, and a backend may replace it by translations that are off by a little: between
 // `reach` and `reach` + kTurningSlack · h either answer is right. The distance to the pose at t changes by at most
 // |way| + radius · angle per unit of t, so halving intervals and dropping those that cannot matter finds the answer;
-// what is undecided when the distance is known to kTurningStep · h is "either".
+// what is inconclusive when the distance is known to kTurningStep · h is "either".
 constexpr double kTurningSlack = 0.1;
 constexpr double kTurningStep = 1e-3;
 

@@ -170,7 +170,7 @@ class MergeDecomposition {
     if (give_from(0)) return;
     if (budget_ < 0 && !is_refuted(needy)) {
       // Each result has an explanation of its own; that all have one at once was not refuted.
-      verdict.undecided = static_cast<int64_t>(needy.size());
+      verdict.inconclusive = static_cast<int64_t>(needy.size());
       return;
     }
     std::vector<int32_t> numbers;

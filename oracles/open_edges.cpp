@@ -212,7 +212,7 @@ void OneEndOfEach::reject(int32_t i, bool gone, Verdict& verdict) const {
 
 void OneEndOfEach::judge(const std::vector<uint8_t>& gone, Verdict& verdict) const {
   const auto none = [](int32_t) { return false; };
-  verdict.undecided += unknown_;
+  verdict.inconclusive += unknown_;
   DisjointSets together(bits_);
   std::vector<std::vector<int32_t>> bits(gone.size());
   for (std::size_t i = 0; i < gone.size(); ++i) {
@@ -248,7 +248,7 @@ void OneEndOfEach::judge(const std::vector<uint8_t>& gone, Verdict& verdict) con
       const bool is_wrong = demand != Demand::either ? (demand == Demand::remove) != (gone[at(i)] != 0)
                                                      : own.size() <= kMostTried && !is_explained({i}, own, gone);
       if (is_wrong) reject(i, gone[at(i)] != 0, verdict);
-      verdict.undecided += demand == Demand::either;
+      verdict.inconclusive += demand == Demand::either;
     }
   }
   // Whatever rounding decides, an edge that is too long beyond doubt loses an end.

@@ -26,11 +26,11 @@ Demand openness(const Body& body, const State& state, int32_t i, int32_t j, doub
 // it. Where rounding leaves some of that open, one choice of all of it must explain all particles that hang on it.
 // Where that is too much to try, each particle must be explained by some choice of its own; and where even that is, it
 // must stay if no choice takes it, and go if every one does, as far as bounds of its count of open edges tell. A
-// particle with both answers then counts as undecided.
+// particle with both answers then counts as inconclusive.
 class OneEndOfEach {
  public:
   // `known_rotations`: as StageRun has it. Where that of a cluster is not known which holds an end of an edge, either
-  // end may be the nearer one, and the edge counts as undecided.
+  // end may be the nearer one, and the edge counts as inconclusive.
   OneEndOfEach(const Setup& setup, const TissueGraph& graph, const State& before,
                std::span<const RotationKnown> known_rotations = {});
   // `gone`: [n] particles that were alive and are not any more.

@@ -28,7 +28,7 @@ constexpr int kFormatVersion = 4;
 // Classes of cases are rare: below this many cases, or with small ones only, an empty class says nothing.
 constexpr int64_t kCasesThatMeetEveryClass = 1000;
 constexpr int kSizeThatMeetsEveryClass = 79;
-// Greatest share of undecided comparisons of iterates (tolerances.md, Iterate by iterate). A judge that grants
+// Greatest share of inconclusive comparisons of iterates (tolerances.md, Iterate by iterate). A judge that grants
 // everything judges nothing. (Merges of whole frames cannot be decided at all; they are counted.)
 constexpr double kMostUndecided = 0.001;
 
@@ -36,7 +36,7 @@ constexpr double kMostCounted = 1e12;  // by one shard, of anything
 
 // Counts and measurements of a result, and those that are summed over shards.
 constexpr const char* kCounts[] = {"cases", "refused", "verdicts", "particles"};
-constexpr const char* kCountsOfSteps[] = {"steps", "particles", "undecidable"};  // within steps_compared
+constexpr const char* kCountsOfSteps[] = {"steps", "particles", "not_compared"};  // within steps_compared
 constexpr const char* kOfThreads[] = {"generating", "running", "judging"};       // within thread_seconds
 
 constexpr const char* kRemedy = "give the results (--json) of all shards of one campaign, each once";
@@ -188,7 +188,7 @@ json campaign_document(const harness::BackendChoice& backend, const CampaignOpti
     const StepsCompared& compared = campaign.compared;
     document["steps_compared"] = {{"steps", compared.steps},
                                   {"particles", compared.particles},
-                                  {"undecidable", compared.undecidable},
+                                  {"not_compared", compared.undecidable},
                                   {"greatest_h", json_number(compared.greatest)}};
   }
   if (options.seconds) {
@@ -228,7 +228,7 @@ void require_fields(const json& part, const std::string& file) {
   }
   for (const json& property : part.at("properties").get<std::vector<json>>()) {
     for (const char* word : {"property", "stage"}) static_cast<void>(property.at(word).get<std::string>());
-    for (const char* count : {"judged", "checked", "failed", "undecided"}) require_count(property, count);
+    for (const char* count : {"judged", "checked", "failed", "inconclusive"}) require_count(property, count);
     for (const char* figure : {"measured", "of_bound"}) static_cast<void>(property.at(figure));
     static_cast<void>(property.at("seconds").get<double>());
   }
@@ -411,11 +411,11 @@ CampaignConclusion conclude(const json& document, bool whole) {
   }
   for (const json& property : document.at("properties")) {
     if (property.at("property") != oracles::kStepByIterates) continue;
-    const double undecided = property.at("undecided").get<double>(), checked = property.at("checked").get<double>();
-    if (undecided <= kMostUndecided * checked) continue;
+    const double inconclusive = property.at("inconclusive").get<double>(), checked = property.at("checked").get<double>();
+    if (inconclusive <= kMostUndecided * checked) continue;
     return {fmt::format("of {:.0f} comparisons of '{}' after {} {:.0f} were inconclusive, so too little was tested",
                         checked, property.at("property").get<std::string>(), property.at("stage").get<std::string>(),
-                        undecided)};
+                        inconclusive)};
   }
   return {};
 }

@@ -92,7 +92,7 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
     Card card;
     card.title = one["property"].text() + " after " + one["stage"].text();
     // Of the case that its counterexample shows.
-    const Field simplified = one["simplified"];
+    const Field simplified = one["shrunk"];
     if (simplified.is_there()) card.words = simplified["witness"].text_or("");
     if (card.words.empty()) card.words = one["witness"].text_or("");
     if (card.words.empty()) card.words = one["text"].text();
@@ -154,17 +154,17 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
     sheet.notes.push_back(left_in_words(left.texts()));
   if (refused > 0)
     sheet.notes.push_back(fmt::format("The backend refused {}: nothing is known of them.", cases_in_words(refused)));
-  if (properties.undecided > 0)
+  if (properties.inconclusive > 0)
     sheet.notes.push_back(fmt::format(
-        "Undecidable within rounding: {} of the things that were looked at may be wrong and were not found to be; they "
+        "Inconclusive within rounding: {} of the things that were looked at may be wrong and were not found to be; they "
         "count as right, and the table says of which properties.",
-        io::grouped(properties.undecided)));
+        io::grouped(properties.inconclusive)));
   if (const Field steps = document["steps_compared"]; steps.is_there())
     sheet.notes.push_back(fmt::format(
         "{} steps were compared with the reference's: {} positions at most {} h apart, and {} that rounding may carry "
         "farther.",
         io::grouped(steps["steps"].count()), io::grouped(steps["particles"].count()),
-        figure_text(steps["greatest_h"].number()), io::grouped(steps["undecidable"].count())));
+        figure_text(steps["greatest_h"].number()), io::grouped(steps["not_compared"].count())));
   sheet.pieces.emplace_back(std::move(properties.grid));
   add_coverage(sheet, document, moves);
   return sheet;
@@ -233,9 +233,9 @@ Sheet judge_sheet(const Field& document) {
       const Field drawn = failure["drawn_size"];
       const std::string which =
           drawn.is_there() ? "of size " + io::grouped(drawn.count()) : io::grouped(failure["index"].count());
-      const std::string simplified = failure["simplified"].text();  // what is said already is not said again
+      const std::string simplified = failure["shrunk"].text();  // what is said already is not said again
       card.facts = {{"Question", fmt::format("{} ({})", which, failure["kind"].text())},
-                    {"Simplified to", failure["size"].text() + (simplified == card.words ? "" : ": " + simplified)},
+                    {"Shrunk to", failure["size"].text() + (simplified == card.words ? "" : ": " + simplified)},
                     {"Measured / bound", fmt::format("{:.4g}{} / {:.4g}{}", failure["measured"].number(), unit,
                                                      failure["bound"].number(), unit)},
                     {"Saved as", failure["file"].text_or("")}};

@@ -21,7 +21,7 @@ Sheet tune_sheet(const Field& document);
 // fail, and how many looked at something.
 struct PropertyTable {
   Grid grid;
-  int64_t failing = 0, judged = 0, undecided = 0;
+  int64_t failing = 0, judged = 0, inconclusive = 0;
 };
 PropertyTable property_table(const Field& properties);
 

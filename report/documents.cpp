@@ -140,17 +140,17 @@ PropertyTable property_table(const Field& properties) {
   PropertyTable table;
   properties.each([&](const Field& one) {
     const int64_t judged = one["judged"].count(), failed = one["failed"].count(), checked = one["checked"].count();
-    const int64_t undecided = one["undecided"].count();
+    const int64_t inconclusive = one["inconclusive"].count();
     const std::optional<double> of_bound = one["of_bound"].number_or_null(),
                                 measured = one["measured"].number_or_null();
     const std::string given_unit = one["unit"].text_or(""), unit = given_unit == "1" ? "" : " " + given_unit;
     const bool fails = failed > 0, looked = judged > 0;
     table.failing += fails;
     table.judged += looked || fails;
-    table.undecided += undecided;
+    table.inconclusive += inconclusive;
     const std::string result = fails ? "fails" : looked ? "holds" : "nothing to look at";
     const std::string doubt =
-        undecided > 0 ? fmt::format("{} of {}", io::grouped(undecided), io::grouped(checked)) : std::string("none");
+        inconclusive > 0 ? fmt::format("{} of {}", io::grouped(inconclusive), io::grouped(checked)) : std::string("none");
     all.push_back({fails    ? 0
                    : looked ? 1
                             : 2,
@@ -167,7 +167,7 @@ PropertyTable property_table(const Field& properties) {
   });
   table.grid.title = "Every property";
   table.grid.words =
-      "What fails comes first, then what comes nearest to its bound. “Undecidable within rounding” counts things that "
+      "What fails comes first, then what comes nearest to its bound. “Inconclusive within rounding” counts things that "
       "may be wrong and were not found to be; they count as right.";
   table.grid.columns = {{"property"},
                         {"after"},
@@ -176,7 +176,7 @@ PropertyTable property_table(const Field& properties) {
                         {"failed", true},
                         {"greatest measured", true},
                         {"of its bound", true},
-                        {"undecidable within rounding", true}};
+                        {"inconclusive within rounding", true}};
   table.grid.filter = 2;
   for (Read& one : all) table.grid.rows.push_back(std::move(one.row));
   return table;

@@ -43,7 +43,7 @@ json row_json(const PropertyRow& row) {
           {"checked", row.checked},
           {"failed", row.failed},
           {"expected", row.expected},
-          {"undecided", row.undecided},
+          {"inconclusive", row.inconclusive},
           {"vacuous", row.vacuous},
           {"frame", row.frame},
           {"measured", row.measured},

@@ -74,9 +74,9 @@ void add_verdict(const Field& verdict, const Measured* known, std::vector<Row>& 
   ++results.verdicts;
   if (shown.bound_source.empty()) shown.bound_source = source;
   shown.checked += checked;
-  shown.undecided += verdict["undecided"].count_or(0);
+  shown.inconclusive += verdict["inconclusive"].count_or(0);
   if (holds && checked == 0) {
-    if (shown.judged == 0 && shown.vacuous.empty()) shown.vacuous = verdict["vacuous"].text_or("");
+    if (shown.judged == 0 && shown.vacuous.empty()) shown.vacuous = verdict["nothing_judged"].text_or("");
     return;
   }
   const bool is_first_failure = !holds && shown.failed + shown.expected == 0;

@@ -29,7 +29,7 @@ struct PropertyRow {
   Stage stage = Stage::skin;
   std::string unit, bound_source;
   int64_t judged = 0;  // verdicts that looked at something, or fail
-  int64_t checked = 0, failed = 0, expected = 0, undecided = 0;
+  int64_t checked = 0, failed = 0, expected = 0, inconclusive = 0;
   std::string vacuous;  // why nothing was looked at; only where judged is 0
   // Of the verdict that comes nearest to its bound, or of the first that fails.
   int64_t frame = 0;

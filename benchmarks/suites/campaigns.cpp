@@ -84,14 +84,14 @@ void warm_up_devices(CampaignOptions campaign, const CampaignRunner& runner) {
 
 // What was compared while the time was taken.
 json compared_in(const CampaignOptions& asked, const Campaign& campaign, bool is_the_reference) {
-  int64_t checked = 0, undecided = 0;
+  int64_t checked = 0, inconclusive = 0;
   for (const harness::PropertySummary& property : campaign.properties.all()) {
     checked += property.checked;
-    undecided += property.undecided;
+    inconclusive += property.inconclusive;
   }
   json error = {{"verdicts", campaign.verdicts}, {"violations", campaign.violations.size()},
                 {"refused", campaign.refused},   {"checked", checked},
-                {"undecided", undecided},        {"positions", nullptr},
+                {"inconclusive", inconclusive},        {"positions", nullptr},
                 {"greatest_h", nullptr}};
   if (asked.dynamics && !is_the_reference) {
     error["positions"] = campaign.compared.particles;

@@ -63,8 +63,8 @@ TESTS_OF_JUDGES = {
 FIELDS = ("Stage", "Fault", "Suspect", "Livelock")
 # What finds a simulator's fault without the tests of this project: campaigns, and scenes that are checked.
 ALONE = {
-    "dissections": [f"fuzz --cases 2000 --seed 1 --simplify 0 --save {RUN}"],
-    "moving cases": [f"fuzz --dynamics --cases 2000 --seed 1 --simplify 0 --save {RUN}"],
+    "dissections": [f"fuzz --cases 2000 --seed 1 --shrink 0 --save {RUN}"],
+    "moving cases": [f"fuzz --dynamics --cases 2000 --seed 1 --shrink 0 --save {RUN}"],
     "scenes": [f"run fixtures/scenes/{scene}.json --check" for scene in ("three_cuts", "cuboid_press", "small_block")],
 }
 ALONE_FORMAT = "cutproof.mutants_alone"
@@ -214,7 +214,7 @@ class Outcome:
     by: str = ""      # which property or test
     took: str = ""    # how many cases, for a person
     message: str = ""
-    strokes: int = None  # of the simplified counterexample; None: there is none
+    strokes: int = None  # of the shrunk counterexample; None: there is none
     particles: int = None
 
 
@@ -226,7 +226,7 @@ def run(command, may_hang=False):
     if not is_fuzz:
         arguments.append("--failfast" if is_python else "--gtest_fail_fast")
     RUN.mkdir(exist_ok=True)
-    # Counterexamples of `cutproof fuzz` are simplified and counted; nobody reads those of rapidcheck.
+    # Counterexamples of `cutproof fuzz` are shrunk and counted; nobody reads those of rapidcheck.
     saved = RUN / "counterexamples"
     shutil.rmtree(saved, ignore_errors=True)
     saved.mkdir()
@@ -378,7 +378,7 @@ def is_simple(row):
 def simplicity(rows):
     sized = [row for row in rows if row["strokes"] is not None]
     simple = sum(1 for row in sized if is_simple(row))
-    return (f"Of {plural(len(sized), 'counterexample')} that `cutproof fuzz` has simplified, {simple} "
+    return (f"Of {plural(len(sized), 'counterexample')} that `cutproof fuzz` has shrunk, {simple} "
             f"{'has' if simple == 1 else 'have'} at most {MOST_STROKES} strokes and {MOST_PARTICLES} particles.")
 
 

@@ -722,19 +722,19 @@ class Result:
 
 def judge(*, rotations=None, components=None, surface=None, clusters=None, dissect=None, cases=None, sizes=None,
           seconds=None, seed=1, precision="single", device="host", promises=None, limits=None, name=None, time_limit=60,
-          simplify=20, save=".", keep_going=False, verbose=False):
+          shrink=20, save=".", keep_going=False, verbose=False):
     """Asks the functions that are given, each in many cases. Returns a Result; raises Failed, Skipped or Error.
 
     cases, seconds: how many matrices, bodies or scenes for each function, or for how long. sizes: of large questions, as
     matrices or particles; (): none; None: beside 65536 and more. promises: words of what is judged; None: the default
-    promises. limits: words of what `dissect` takes; None: all. time_limit: seconds for each answer. simplify:
+    promises. limits: words of what `dissect` takes; None: all. time_limit: seconds for each answer. shrink:
     seconds for shrinking each failing case. save: folder for failing cases. keep_going: beyond ten questions that
     were not answered.
     """
     __tracebackhide__ = True  # pytest shows the caller, not us
     functions = _given(rotations=rotations, components=components, surface=surface, clusters=clusters, dissect=dissect)
     guest = _Guest(functions, precision, device, promises, name, limits)
-    words = list(functions) + [f"--seed={seed}", f"--time-limit={time_limit}", f"--simplify={simplify}",
+    words = list(functions) + [f"--seed={seed}", f"--time-limit={time_limit}", f"--shrink={shrink}",
                                f"--save={os.fspath(save)}"]
     words += [f"--cases={cases}"] if cases is not None else []
     words += [f"--sizes={','.join(map(str, sizes)) or 0}"] if sizes is not None else []
@@ -873,11 +873,11 @@ def _describe(guest, document, seed, precision):
                 else f"question {failure['index']}"
             lines += [f"{name}: '{failure['property']}' fails in {question} ({failure['kind']})",
                       f"  {failure['text']}"]
-            lines += [f"  shrunk to {failure['size']}: {failure['simplified']}",
+            lines += [f"  shrunk to {failure['size']}: {failure['shrunk']}",
                       f"  measured {measured}{unit}, the bound is {bound}{unit}",
                       f"  saved; to see it again: "
                       f"cutproof.replay({failure['file']!r}, {name}={function}{more})"]
-            trace = guest.tracebacks.get(failure["simplified"]) or guest.tracebacks.get(failure["text"])
+            trace = guest.tracebacks.get(failure["shrunk"]) or guest.tracebacks.get(failure["text"])
             if trace is None and failure["text"].startswith("it did not answer"):
                 trace = guest.tracebacks.get("out of time")
             lines += ["  " + line for line in (trace or "").split("\n") if line]

@@ -538,7 +538,7 @@ nlohmann::json to_json(const KernelCampaign& campaign) {
                         {"index", f.index},
                         {"kind", f.simplest.kind},
                         {"text", f.verdict.witness.text},
-                        {"simplified", f.of_simplest.witness.text},
+                        {"shrunk", f.of_simplest.witness.text},
                         {"measured", json_number(f.of_simplest.measured)},
                         {"bound", json_number(f.of_simplest.bound)},
                         {"unit", f.of_simplest.unit},

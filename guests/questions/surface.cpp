@@ -356,7 +356,7 @@ struct Between {
 struct Sides {
   std::vector<Between> between;
   int64_t outer = 0, inner = 0;        // shells, by the sign of their volume
-  int64_t checked = 0, undecided = 0;  // nodes; on the surface within rounding
+  int64_t checked = 0, inconclusive = 0;  // nodes; on the surface within rounding
   int64_t wrong = 0, inside_out = 0;   // nodes; shells whose triangles turn the wrong way
   std::string first_wrong;
 };
@@ -399,7 +399,7 @@ Sides sides_of(const Surface& surface, const Occupancy& nodes, Precision precisi
       const auto touches = [&](const Crossing& c) { return std::abs(c.x - i) <= c.within; };
       if ((next != end && touches(*next)) ||
           (next != crossings.begin() && (next - 1)->line == line && touches(*(next - 1)))) {
-        ++sides.undecided;
+        ++sides.inconclusive;
       } else if (around != (lives ? 1 : 0)) {
         ++sides.wrong;
         if (sides.first_wrong.empty()) {
@@ -444,7 +444,7 @@ void check_shells(const Surface& surface, const Occupancy& nodes, Precision prec
   const Sides sides = sides_of(surface, nodes, precision);
   const int64_t joining = count_joining(sides, own);
   verdict.checked = own.outer + own.inner;
-  verdict.undecided = sides.undecided;
+  verdict.inconclusive = sides.inconclusive;
   verdict.measured = static_cast<double>(std::abs(sides.outer - own.outer) + std::abs(sides.inner - own.inner) +
                                          joining + sides.inside_out + sides.wrong);
   if (verdict.measured == 0) return;

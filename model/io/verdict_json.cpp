@@ -19,8 +19,8 @@ nlohmann::json verdict_json(const Verdict& verdict, bool expected_failure) {
                            {"unit", verdict.unit},
                            {"bound_source", verdict.bound_source},
                            {"checked", verdict.checked}};
-  if (!verdict.vacuous.empty()) result["vacuous"] = verdict.vacuous;
-  if (verdict.undecided > 0) result["undecided"] = verdict.undecided;
+  if (!verdict.vacuous.empty()) result["nothing_judged"] = verdict.vacuous;
+  if (verdict.inconclusive > 0) result["inconclusive"] = verdict.inconclusive;
   if (expected_failure && !verdict.holds) result["expected_failure"] = true;
   if (!verdict.holds) {
     result["witness"] = {{"text", verdict.witness.text},

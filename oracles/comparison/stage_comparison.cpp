@@ -101,7 +101,7 @@ void Undecidable::join(const Undecidable& other) {
   otherwise += other.otherwise;
   positions += other.positions;
   rotations += other.rotations;
-  undecided += other.undecided;
+  inconclusive += other.inconclusive;
 }
 
 RestFrameComparison compare_rest_frames(const Setup& setup, const State& state) {
@@ -176,7 +176,7 @@ void StageComparison::compare_step(const State& before, const State& after, Stag
   if (again.step) {
     AdmissibleStep& step = *again.step;
     found.undecidable.otherwise = step.otherwise;
-    found.undecidable.undecided = step.undecided;
+    found.undecidable.inconclusive = step.inconclusive;
     // How far the reference is from the oracle's outcome: particles [h], velocities [h] times dt, rotations by their
     // farthest member [h].
     const double h = setup_.body.grid.spacing, dt = setup_.substep_length[at(before.frame)];

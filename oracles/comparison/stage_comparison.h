@@ -36,7 +36,7 @@ struct Undecidable {
   int64_t otherwise = 0;  // decisions of steps that the backend has taken, within rounding, as the reference has not
   int64_t positions = 0;  // particles that the rounding of a step carries farther than a bound, or makes faster
   int64_t rotations = 0;  // clusters, the same
-  int64_t undecided = 0;  // of positions: too far for a sharp bound (Verdict::undecided)
+  int64_t inconclusive = 0;  // of positions: too far for a sharp bound (Verdict::inconclusive)
 
   void join(const Undecidable& other);
 };

@@ -249,7 +249,7 @@ void IterateProbe::judge(const ShownStep& shown, Verdict& verdict) const {
       judge.iteration(k, needs_earlier ? &state(k - 1) : nullptr, state(k), state(k + 1));
     }
     verdict.checked += judge.checked();
-    verdict.undecided += judge.undecided();
+    verdict.inconclusive += judge.inconclusive();
     const IterateFinding& worst = judge.worst();
     if (worst.share <= verdict.measured || !verdict.holds) continue;
     verdict.measured = worst.share;

@@ -24,7 +24,7 @@ constexpr double kEqualRounds = 256;
 // Entries of RᵀR - I, in units of u: R is made of a unit quaternion, whose length is off by 2 u, which is 8 u in them;
 // its entries round by 4 u more, which is 2 √3 times that.
 constexpr double kOrthogonalRounds = 22;
-// A line's rotation is undecided where cos² of half its turn is not above this: nothing is left of the previous one.
+// A line's rotation is inconclusive where cos² of half its turn is not above this: nothing is left of the previous one.
 constexpr double kNothingLeft = 1e-8;
 constexpr int kTries = 256;
 // Where the first of these are farther apart than this [h], turns of blade and walls lead anywhere, but no more than so
@@ -292,7 +292,7 @@ void SubstepJudge::rotation(int32_t c, const Eigen::Matrix3d& a, double off, con
     see(IteratePart::flag, best_rotation(to_mat3(a)).separation, moved, c);
   }
   if (!(size > 8 * off)) {
-    ++undecided_;
+    ++inconclusive_;
     return;
   }
   const Eigen::Matrix3d p = as_eigen(r).transpose() * a;
@@ -308,7 +308,7 @@ void SubstepJudge::rotation(int32_t c, const Eigen::Matrix3d& a, double off, con
   // Of many the nearest to the previous one, which was shown too.
   const NearestRotation nearest = nearest_of_rank_one(best_rotation(to_mat3(a)), previous);
   if (!(nearest.weight > kNothingLeft)) {
-    ++undecided_;
+    ++inconclusive_;
     return;
   }
   const double away = (as_eigen(nearest.r) - as_eigen(r)).norm() / std::sqrt(2.0);
@@ -349,7 +349,7 @@ void SubstepJudge::particle(int32_t i, const Candidate& candidate, Vec3 seen, Ve
   if (decided) {
     see(IteratePart::contact, off, after, i);
   } else {
-    ++undecided_;
+    ++inconclusive_;
   }
   // A backend adds up how far contacts have put particles from where its solver would have. Where that is no more than
   // rounding, it is not known whether the backend has counted this particle.

@@ -55,7 +55,7 @@ class SubstepJudge {
   const IterateFinding& worst() const { return worst_; }
   int64_t checked() const { return checked_; }
   // Particles of which turns of blade and walls let rounding decide, clusters whose rotation is no more than rounding.
-  int64_t undecided() const { return undecided_; }
+  int64_t inconclusive() const { return inconclusive_; }
 
  private:
   struct Cluster {
@@ -119,7 +119,7 @@ class SubstepJudge {
   Vec3 pushed_;
   double pushed_rounding_ = 0, push_in_doubt_ = 0;
   IterateFinding worst_;
-  int64_t checked_ = 0, undecided_ = 0;
+  int64_t checked_ = 0, inconclusive_ = 0;
 };
 
 }  // namespace cutproof::oracles

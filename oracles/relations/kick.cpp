@@ -400,7 +400,7 @@ Verdict others_feel_nothing(const Differences& differences, const std::vector<do
     const Farthest farthest = differences.farthest(f, is_other);
     const double bound = bounds[at(f)];
     verdict.checked += farthest.among;
-    if (!std::isfinite(bound)) verdict.undecided += farthest.among;
+    if (!std::isfinite(bound)) verdict.inconclusive += farthest.among;
     if (farthest.particle < 0 || !std::isfinite(bound)) continue;
     if (f >= answer.kick_frame && (answer.sharpest_frame < 0 || bound < answer.least_bound)) {
       answer.least_bound = bound;
@@ -480,7 +480,7 @@ Verdict answers_are_equal(const KickedRuns& runs, const std::map<std::size_t, Ce
     }
     const double bound = 2 * resolution + runs.tolerance * way(most);
     if (!(bound < way(most))) {  // no answer at all would be within it
-      ++verdict.undecided;
+      ++verdict.inconclusive;
       continue;
     }
     ++verdict.checked;

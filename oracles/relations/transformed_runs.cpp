@@ -224,7 +224,7 @@ Setup disturbed(Setup setup, double amount) {
 }
 
 // Particles whose life depends on a disturbance of the input: decisions inside the rounding band among them.
-std::vector<uint8_t> undecided(Backend& backend, const Setup& setup, const State& state, Span span, const State& result,
+std::vector<uint8_t> inconclusive(Backend& backend, const Setup& setup, const State& state, Span span, const State& result,
                                uint64_t seed) {
   std::vector<uint8_t> undecidable(state.alive.size(), 0);
   const auto note = [&](const State& other) {
@@ -315,7 +315,7 @@ struct TransformedRuns {
 int32_t wrongly_decided(const TransformedRuns& runs, std::size_t piece, uint64_t seed) {
   const State expected = runs.scene.state(runs.original[piece]);
   const std::vector<uint8_t> undecidable =
-      undecided(runs.backend, runs.setup, runs.state, runs.span, runs.original.back(), seed);
+      inconclusive(runs.backend, runs.setup, runs.state, runs.span, runs.original.back(), seed);
   for (int32_t i = 0; i < runs.setup.body.particle_count(); ++i) {
     const auto j = at(runs.scene.particle(i));
     if (expected.alive[j] != runs.transformed[piece].alive[j] && !undecidable[at(i)]) return i;

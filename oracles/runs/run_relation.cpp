@@ -299,7 +299,7 @@ class RunRelation::Implementation {
          expected);
   }
 
-  // Whom both runs have; who exists in one alone of A and its disturbed runs is undecided.
+  // Whom both runs have; who exists in one alone of A and its disturbed runs is inconclusive.
   void find_existing(const RunFrame& a, const RunFrame& b, std::span<const RelatedRun> noise) {
     const std::size_t n = a.positions.size();
     if (inverse_.size() != n) set_inverse(n);
@@ -312,7 +312,7 @@ class RunRelation::Implementation {
       ++verdict.checked;
       both_[i] = in_first && in_second && !is_open;
       if (is_open) {
-        ++verdict.undecided;
+        ++verdict.inconclusive;
         may_branch_ = true;
       } else if (in_first != in_second && !may_branch_) {
         ++verdict.measured;
@@ -424,7 +424,7 @@ class RunRelation::Implementation {
     if (of_a == of_b) return;
     for (const RelatedRun& run : noise) {
       if (run.coupling == nullptr || sets_of(*run.coupling, {}) == of_a) continue;
-      ++verdict.undecided;  // rounding decides which groups there are
+      ++verdict.inconclusive;  // rounding decides which groups there are
       may_branch_ = true;
       return;
     }

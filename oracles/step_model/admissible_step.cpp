@@ -135,7 +135,7 @@ class Judge {
   }
   AdmissibleStep nothing_known() const {
     AdmissibleStep found;
-    found.checked = found.undecided = std::count(before_.alive.begin(), before_.alive.end(), 1);
+    found.checked = found.inconclusive = std::count(before_.alive.begin(), before_.alive.end(), 1);
     return found;
   }
 
@@ -283,7 +283,7 @@ class Judge {
   }
 
   // A decision that rounding may have taken the other way changes where all that is coupled with the particle ends.
-  // What is wrong there is what runs that draw such decisions do not explain; all else of these sets is undecided.
+  // What is wrong there is what runs that draw such decisions do not explain; all else of these sets is inconclusive.
   void leave_open() {
     std::set<int32_t> open_sets;
     std::vector<double> open(before_.x.size(), -1);
@@ -370,7 +370,7 @@ class Judge {
   // Of a particle's velocity nothing sharp is asked, or of its place neither.
   bool is_blunt(std::size_t i) const { return blunt_[i] != 0 || !(bounds_.velocity[i] <= kSmall * h_); }
 
-  // A quantity with a coarse bound counts as undecided where it holds, and does not count in the sharpness of the
+  // A quantity with a coarse bound counts as inconclusive where it holds, and does not count in the sharpness of the
   // judge.
   void see(StepPart part, int32_t where, double measured, double bound, bool blunt = false) {
     if (blunt && measured <= bound) return;
@@ -449,11 +449,11 @@ class Judge {
     found.otherwise = std::count_if(given_.begin(), given_.end(), [](const Mat3* r) { return r != nullptr; });
     found.checked = std::count_if(before_.alive.begin(), before_.alive.end(), [](uint8_t a) { return a != 0; }) +
                     before_.clusters.count();
-    found.undecided = is_undecided_ ? 1 : 0;
+    found.inconclusive = is_undecided_ ? 1 : 0;
     for (std::size_t i = 0; i < before_.alive.size(); ++i) {
       found.position_bound.push_back(bounds_.position[i] / h_);
       found.velocity_bound.push_back(bounds_.velocity[i] / h_);
-      if (before_.alive[i] != 0 && is_blunt(i)) ++found.undecided;
+      if (before_.alive[i] != 0 && is_blunt(i)) ++found.inconclusive;
     }
     for (std::size_t c = 0; c < reach_.size(); ++c) {
       found.reach.push_back(std::max(reach_[c] / h_, 1.0));
@@ -461,7 +461,7 @@ class Judge {
       // As of positions: beyond this, nothing sharp was asked.
       const bool is_gone = !known_.empty() && known_[c] == RotationKnown::gone;
       if (is_gone) --found.checked;
-      if (!is_gone && (!(found.rotation_bound.back() <= kSmall) || !is_known(c))) ++found.undecided;
+      if (!is_gone && (!(found.rotation_bound.back() <= kSmall) || !is_known(c))) ++found.inconclusive;
     }
     found.outcome = std::move(outcome_);
     return found;

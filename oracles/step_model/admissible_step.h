@@ -1,5 +1,5 @@
 // Whether a step ends within rounding of the method, judged from its first and last state. Where rounding explains both
-// answers of a decision, everything coupled with it is undecided (docs/design/tolerances.md, The step again). Backends
+// answers of a decision, everything coupled with it is inconclusive (docs/design/tolerances.md, The step again). Backends
 // that show iterates are judged more sharply: oracles/iterates/. Internal to oracles/.
 #pragma once
 #include <cstdint>
@@ -37,7 +37,7 @@ struct AdmissibleStep {
   // Particles and rotations of which no sharp answer could be asked: rounding carries them farther than any rule of
   // small changes holds, or decisions are open on which they hang. They lie within what rounding, or those decisions,
   // can do.
-  int64_t undecided = 0;
+  int64_t inconclusive = 0;
   std::vector<double> position_bound;  // [n] effect of rounding on the outcome [h]
   std::vector<double> velocity_bound;  // [n] the same, times dt [h]
   std::vector<double> rotation_bound;  // [m] the same, where it puts the farthest member [h]
@@ -45,7 +45,7 @@ struct AdmissibleStep {
 };
 
 // `before` and `after`: well formed, of the same clusters; `before` finite, its schedule not over. `known_rotations`:
-// as StageRun has it; one that is not known is not judged, and counts as undecided; one that is gone is not
+// as StageRun has it; one that is not known is not judged, and counts as inconclusive; one that is gone is not
 // asked for. `at_once`: threads for disturbed
 // runs; 0: one, or where runs are long one for each processor. The answer is the same with any number.
 AdmissibleStep nearest_admissible_step(const Setup& setup, const State& before, const State& after,

@@ -77,7 +77,7 @@ StepAgain step_again(const Setup& setup, const State& before, const State& after
   verdict.measured = step.measured;
   verdict.bound = step.bound;
   verdict.checked = step.checked;
-  verdict.undecided = step.undecided;
+  verdict.inconclusive = step.inconclusive;
   if (!step.holds) {
     Concerned concerned;
     std::string whose;

@@ -36,7 +36,7 @@ function statusOf(row, data) {
   if (row.failed > 0) return ['bad', 'fails'];
   if (row.expected > 0) return ['warn', '! fails, as expected'];
   if (row.judged === 0) return ['muted', data.foreign ? '– not judged' : '– nothing to look at'];
-  return ['good', row.undecided > 0 ? 'holds, some within rounding' : 'holds'];
+  return ['good', row.inconclusive > 0 ? 'holds, some within rounding' : 'holds'];
 }
 
 export const exactWords = (n) => `${plural(n, 'more row')}: exact, and ${n === 1 ? 'it holds' : 'they hold'}`;
@@ -65,7 +65,7 @@ export function table(data, jump) {
     else if (row.expected > 0) details.push(`${count(row.expected)} of ${plural(row.judged, 'verdict')} fail, which the scene expects`);
     else if (row.judged > 0) details.push(data.foreign ? `${count(row.checked)} looked at` : plural(row.judged, 'verdict'));
     else details.push(row.vacuous || 'there was nothing to look at');
-    if (row.undecided > 0) details.push(`${plural(row.undecided, 'thing')} undecidable within rounding, counted as right`);
+    if (row.inconclusive > 0) details.push(`${plural(row.inconclusive, 'thing')} inconclusive within rounding, counted as right`);
     (holds(row) && row.ofJudging ? ofJudging : isExact(row) ? exact : row.judged > 0 ? shown : others).push(element('tr', { class: fails ? kind : null },
       element('th', { scope: 'row' }, nameNode(row.property, data.command), !data.foreign && element('span', { class: 'muted small', text: ` after ${row.stage}` })),
       element('td', {}, element('span', { class: `status ${kind}` }, icon(kind), element('span', { text: words })), element("span", { class: "muted small block", text: details.join('; ') })),

@@ -36,7 +36,7 @@ RowColumns columns_of_campaigns() {
                                   },
                                   Shown::terminal},
                                  {"violations", "{error/violations}"},
-                                 {"undecided", "{error/undecided} of {error/checked}"},
+                                 {"inconclusive", "{error/inconclusive} of {error/checked}"},
                                  {"positions", "{error/positions}", Shown::page},
                                  {"max [h]", "{error/greatest_h:.2g}"}});
   return columns;
@@ -53,7 +53,7 @@ void add_campaigns(Sheet& sheet, const Field& document) {
   const RowColumns columns = columns_of_campaigns();
   Grid grid = grid_of("Campaigns",
                       "What was compared meanwhile stands beside each rate: verdicts, positions after a step beside "
-                      "the reference's and the greatest distance of one, and what stayed undecided within rounding.",
+                      "the reference's and the greatest distance of one, and what stayed inconclusive within rounding.",
                       columns);
   document["rows"].each([&](const Field& row) {
     const int64_t cases = row["cases"].count();

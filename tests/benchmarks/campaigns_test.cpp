@@ -40,7 +40,7 @@ TEST_F(BenchCampaigns, TellsRateSharesAndComparisonsOfEachBesideTheReferences) {
     EXPECT_EQ(row.at("of_reference").is_null(), !is_compared);
     const json& error = row.at("error");
     EXPECT_GT(error.at("verdicts"), 12);
-    EXPECT_GT(error.at("checked"), error.at("undecided").get<int64_t>());
+    EXPECT_GT(error.at("checked"), error.at("inconclusive").get<int64_t>());
     EXPECT_EQ(error.at("violations"), 0);
     EXPECT_EQ(error.at("positions").is_null(), k != 5);
     EXPECT_EQ(error.at("greatest_h").is_null(), k != 5);

@@ -64,11 +64,11 @@ TEST_F(Fuzz, ComparesEveryStepOfAMovingBodyWithTheReferences) {
   const json compared = result("whole.json").at("steps_compared");
   EXPECT_GE(compared.at("steps"), 200);
   EXPECT_GT(compared.at("particles"), 1000);
-  EXPECT_LT(compared.at("undecidable").get<double>(), 0.05 * compared.at("particles").get<double>());
+  EXPECT_LT(compared.at("not_compared").get<double>(), 0.05 * compared.at("particles").get<double>());
   EXPECT_GT(compared.at("greatest_h"), 0);
   EXPECT_LE(compared.at("greatest_h"), 1e-4);
   // How claims of threads end may differ from one load to another, and with them clusters: only sums are compared.
-  json sum = {{"steps", 0}, {"particles", 0}, {"undecidable", 0}};
+  json sum = {{"steps", 0}, {"particles", 0}, {"not_compared", 0}};
   double greatest = 0;
   for (const std::string shard : {"1", "2"}) {
     ASSERT_EQ(cutproof(moving + shard + ".json --shard " + shard + "/2").status, 0);
@@ -245,21 +245,21 @@ TEST_F(Fuzz, KeepsCasesAsTheyWereDrawnWhereNoTimeIsLeftToSimplifyThem) {
   const json violations = result("late.json").at("violations");
   ASSERT_FALSE(violations.empty()) << late.output;
   for (const json& violation : violations) {
-    EXPECT_FALSE(violation.contains("simplified") || violation.contains("drawn")) << violation;
+    EXPECT_FALSE(violation.contains("shrunk") || violation.contains("drawn")) << violation;
     const Counterexample kept = counterexample_from_json(read(violation.at("file")), violation.at("file"));
     EXPECT_EQ(kept.index, violation.at("index"));
     const int size = static_cast<int>(kept.index % 21);
     EXPECT_EQ(kept.failing, draw_case(7 + static_cast<uint64_t>(kept.index), size));
   }
-  // What it says brings the same case, with time to simplify it.
+  // What it says brings the same case, with time to shrink it.
   const auto index = violations.front().at("index").get<int64_t>();
   const std::string options = "--seed " + std::to_string(7 + index) + " --sizes " + std::to_string(index % 21) + "-" +
                               std::to_string(index % 21) + " --cases 1";
   EXPECT_NE(on_one_line(late.output).find(options), std::string::npos) << late.output;
   const Outcome again = cutproof("fuzz --backend plugin:" CUTPROOF_PLUGIN_OF_THE_REFERENCE ",detect " + options +
-                                 " --simplify 1 --json again.json");
+                                 " --shrink 1 --json again.json");
   EXPECT_EQ(again.status, 1) << again.output;
-  EXPECT_TRUE(result("again.json").at("violations").at(0).contains("simplified")) << again.output;
+  EXPECT_TRUE(result("again.json").at("violations").at(0).contains("shrunk")) << again.output;
 }
 
 TEST_F(Fuzz, RefusesDevicesOfABackendThatNeedsNone) {

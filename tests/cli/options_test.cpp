@@ -123,7 +123,7 @@ TEST_F(Options, SayRangesInWordsAndTakeNoNumberForAnother) {
            {"fuzz --seconds nan", {"--seconds: must be a finite number from 0 up"}},
            {"fuzz --seconds inf", {"--seconds: must be a finite number from 0 up"}},
            {"fuzz --seconds 0x1p3", {"--seconds: must be a finite number"}},
-           {"fuzz --simplify nan", {"--simplify"}},
+           {"fuzz --shrink nan", {"--shrink"}},
            {"judge x.so --time-limit nan", {"--time-limit: must be a number from 0.01 to 1e+06"}},
            {"judge x.so --seconds inf", {"--seconds"}},
            {"tune s.json --tolerance nan", {"--tolerance: must be a finite number above 0"}},

@@ -245,7 +245,7 @@ def campaigns(program):
         {"index": 4, "property": "coverage", "stage": "skin", "text": "'coverage' fails: 5 % <of> it",
          "witness": "5 % <of>\nit", "file": "found here.json"},
         {"index": 7, "property": "runs to its end", "stage": "skin", "text": "thrown", "witness": "", "file": "b.json",
-         "simplified": {"particles": 1, "strokes": 0, "property": "isolation", "stage": "skin",
+         "shrunk": {"particles": 1, "strokes": 0, "property": "isolation", "stage": "skin",
                         "text": "'isolation' fails: alone", "witness": "alone"}}]
     (program.folder / "2.json").write_text(json.dumps(failed))
     merging = ["fuzz", "--merge", "1.json", "2.json"]
@@ -253,7 +253,7 @@ def campaigns(program):
     message, text = of(cases["coverage after skin"], "failure")
     expect(message == "5 % <of>\nit", f"message {message!r}")
     expect("cutproof replay 'found here.json'" in text and "case 4: 'coverage' fails: 5 % <of> it" in text, text)
-    # Its command shows the simplified case, so that is what is told of it.
+    # Its command shows the shrunk case, so that is what is told of it.
     message, text = of(cases["runs to its end after skin"], "failure")
     expect(message == "alone" and "case 7: 'isolation' fails: alone" in text, f"a violation of no listed property {text}")
     message, text = of(cases["enough was judged"], "error")

@@ -192,11 +192,11 @@ def drawn(program):
             run(f"fuzz --backend host --dynamics --cases 20 --sizes 0-20 --shard {shard}/2")))
     run("fuzz --merge 1.json 2.json")
     run("fuzz --merge 2.json", status=1)
-    run("fuzz --sizes 0-20 --seed 7 --cases 50 --simplify 1 --backend", f"plugin:{sys.argv[4]},split", status=1)
+    run("fuzz --sizes 0-20 --seed 7 --cases 50 --shrink 1 --backend", f"plugin:{sys.argv[4]},split", status=1)
     run("judge", sys.argv[3], "components", "--cases", "30", "--sizes", "0")
-    run("judge", sys.argv[3], "components", "--cases", "30", "--parameters", "labels16", "--simplify", "1", status=1)
+    run("judge", sys.argv[3], "components", "--cases", "30", "--parameters", "labels16", "--shrink", "1", status=1)
     run("judge", sys.argv[3], "components", "--cases", "60", "--parameters", "refuse", status=1)
-    run("judge", sys.argv[4], "stages", "--cases", "30", "--parameters", "split", "--simplify", "1", status=1)
+    run("judge", sys.argv[4], "stages", "--cases", "30", "--parameters", "split", "--shrink", "1", status=1)
 
 
 def measured(program):

@@ -215,7 +215,7 @@ TEST(JunitCases, OfACampaignNameEveryViolationAndTheWhole) {
       {"text", "as it was drawn"},
       {"witness", "far"},
       {"file", "found.json"},
-      {"simplified", {{"text", "as it is shown"}, {"property", "coverage"}, {"witness", "near"}}}};
+      {"shrunk", {{"text", "as it is shown"}, {"property", "coverage"}, {"witness", "near"}}}};
   const nlohmann::json document = {
       {"properties", {property("motion", 3, 1), property("finite", 3, 0), property("no pass", 0, 0)}},
       {"violations", {violation}},

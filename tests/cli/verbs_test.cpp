@@ -255,7 +255,7 @@ TEST_F(Verbs, RefuseUnknownOptionsMissingValuesAndNegativeCounts) {
                                                         {"fuzz --cases -1", "--cases"},
                                                         {"fuzz --cases 1.5", "--cases"},
                                                         {"fuzz --seconds -1", "--seconds"},
-                                                        {"fuzz --simplify -1", "--simplify"},
+                                                        {"fuzz --shrink -1", "--shrink"},
                                                         {"fuzz --seed -1", "--seed"},
                                                         {"fuzz --batch 0", "--batch"},
                                                         {"fuzz --threads -1", "--threads"},

@@ -101,7 +101,7 @@ class Functions(Dissected):
 
     def said(self, function, **options):
         with self.assertRaises(cutproof.Failed) as caught:
-            self.judge(function, **{"cases": 10, "simplify": 0, **options})
+            self.judge(function, **{"cases": 10, "shrink": 0, **options})
         return str(caught.exception)
 
     def test_what_a_scene_holds(self):
@@ -161,7 +161,7 @@ class Faults(Dissected):
         large, faults = [], {fault: by_simulator[name] for fault, by_simulator in FAULTS.items() if name in by_simulator}
         for fault, wanted in faults.items():
             with self.subTest(fault):
-                failures, text = self.failures(name, fault, cases=20, simplify=10)
+                failures, text = self.failures(name, fault, cases=20, shrink=10)
                 self.assertIn(wanted, failures, text)
                 found = failures[wanted]
                 print(f"{name} {fault}: '{wanted}' in question {found['index']}, {found['size']}", file=sys.stderr)
@@ -170,7 +170,7 @@ class Faults(Dissected):
         self.assertLessEqual(len(large), 0.2 * len(faults), large)
 
     def test_a_saved_scene_fails_again_and_so_does_its_run(self):
-        failures, text = self.failures("springs", "heals", cases=20, simplify=3)
+        failures, text = self.failures("springs", "heals", cases=20, shrink=3)
         file = failures[ACROSS]["file"]
         function = scene.dissection(PROGRAMS["springs"].simulate, "heals")
         with self.assertRaises(cutproof.Failed) as caught:

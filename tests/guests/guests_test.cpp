@@ -1247,7 +1247,7 @@ TEST(PluginBackend, LeavesOfWholeFramesNoMoreUndecidedThanACampaignMay) {
   const harness::PropertySummary* const step = moving.properties.find("admissible step", Stage::step);
   ASSERT_NE(step, nullptr);
   EXPECT_GT(step->checked, 1000);
-  EXPECT_LT(static_cast<double>(step->undecided), 0.01 * static_cast<double>(step->checked));
+  EXPECT_LT(static_cast<double>(step->inconclusive), 0.01 * static_cast<double>(step->checked));
 }
 
 // Bodies of an odd number of particles are refused: they count as that, and the others are judged.
@@ -1358,7 +1358,7 @@ TEST_F(JudgeVerb, FindsFaultsOfWidthByDefaultAndSavesTheirSize) {
   EXPECT_TRUE(contains(again.output, "0 and 65536 both have the label 0")) << again.output;
   EXPECT_EQ(run(fmt::format("judge {} --case {}", PLUGIN_in_c, file)).status, 0);
 
-  EXPECT_EQ(run(fmt::format("judge {} components --parameters first_16384 --cases 1 --simplify 0 --save {}",
+  EXPECT_EQ(run(fmt::format("judge {} components --parameters first_16384 --cases 1 --shrink 0 --save {}",
                             PLUGIN_in_c, folder_))
                 .status,
             1);

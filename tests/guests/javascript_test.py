@@ -123,7 +123,7 @@ class ThreeJs(Engine):
                     numpy.reshape(answer["triangles"], (-1, 3)).astype(int))
 
         try:
-            cutproof.judge(surface=surface, cases=cases, sizes=(), simplify=5, save=self.folder)
+            cutproof.judge(surface=surface, cases=cases, sizes=(), shrink=5, save=self.folder)
         except cutproof.Failed as failed:
             return {each["property"]: each for each in failed.document["operations"][0]["failures"]}
         return {}
@@ -132,7 +132,7 @@ class ThreeJs(Engine):
         failures = self.judge(2000)
         self.assertEqual(set(failures), {"surface shells"})
         self.assertEqual(failures["surface shells"]["size"], "2 particles")
-        self.assertIn("It is right in the other polarity", failures["surface shells"]["simplified"])
+        self.assertIn("It is right in the other polarity", failures["surface shells"]["shrunk"])
 
     def test_with_inside_and_outside_exchanged_they_are_right(self):
         self.assertEqual(self.judge(2000, "exchanged"), {})

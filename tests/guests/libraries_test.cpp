@@ -140,7 +140,7 @@ TEST_P(OfEigen, HoldsExceptOfDenormals) {
   const json& failure = found.at("failures")[0];
   EXPECT_EQ(failure.at("property"), "best rotation");
   EXPECT_EQ(failure.at("kind"), "denormals: entries below the least normal number");
-  EXPECT_TRUE(failure.at("simplified").get<std::string>().starts_with("1 of 1 wrong; matrix 0: tr(RᵀA) is 0."));
+  EXPECT_TRUE(failure.at("shrunk").get<std::string>().starts_with("1 of 1 wrong; matrix 0: tr(RᵀA) is 0."));
   // The saved matrix fails again, by itself.
   const Outcome again =
       cutproof("judge " + std::string(GetParam()) + " --case " + failure.at("file").get<std::string>());
@@ -174,7 +174,7 @@ TEST_F(Libraries, PolarDecompositionOfBulletMayReflect) {
   const json found = judged(EXAMPLE_bullet_polar, "", 1);
   ASSERT_EQ(found.at("failures").size(), 2u) << found;
   EXPECT_EQ(found.at("failures")[0].at("property"), "rotation");
-  const std::string simplified = found.at("failures")[0].at("simplified");
+  const std::string simplified = found.at("failures")[0].at("shrunk");
   EXPECT_TRUE(simplified.starts_with("1 of 1 wrong; matrix 0: a reflection. A = [")) << simplified;
   EXPECT_EQ(found.at("failures")[1].at("property"), "best rotation");
 
@@ -422,7 +422,7 @@ TEST_P(OfVtk, ExchangedTheyHaveTheOtherPolarity) {
       judged(EXAMPLE_vtk_surface, std::string("--parameters ") + GetParam() + "_exchanged --cases 200", 1);
   ASSERT_EQ(found.at("failures").size(), 1u) << found;
   EXPECT_EQ(found.at("failures")[0].at("property"), "surface shells");
-  const std::string text = found.at("failures")[0].at("simplified");
+  const std::string text = found.at("failures")[0].at("shrunk");
   EXPECT_TRUE(text.starts_with("1 outer and 0 inner shells around 2 components with 0 cavities")) << text;
   EXPECT_NE(text.find("It is right in the other polarity (1 components, 0 cavities)"), std::string::npos) << text;
 }

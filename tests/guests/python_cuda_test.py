@@ -61,7 +61,7 @@ class Mine:
 class Judged(unittest.TestCase):
     def judge(self, **options):
         with tempfile.TemporaryDirectory() as folder:
-            return cutproof.judge(**{"save": folder, "simplify": 0, "cases": 60, "device": "cuda", **options})
+            return cutproof.judge(**{"save": folder, "shrink": 0, "cases": 60, "device": "cuda", **options})
 
     def fault(self, **options):
         with self.assertRaises(cutproof.Failed) as caught:

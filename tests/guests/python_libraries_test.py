@@ -19,7 +19,7 @@ import cutproof_run
 
 def judge(**options):
     with tempfile.TemporaryDirectory() as folder:
-        return cutproof.judge(**{"save": folder, "simplify": 5, "sizes": (), **options})
+        return cutproof.judge(**{"save": folder, "shrink": 5, "sizes": (), **options})
 
 
 class Library(unittest.TestCase):
@@ -112,7 +112,7 @@ class SciPy(Library, JudgedRuns):
         from scipy.linalg import polar
         failures = self.failures(rotations=each(lambda a: polar(a)[0]), cases=5000)
         self.assertEqual(set(failures), {"rotation"})
-        self.assertIn("a reflection", failures["rotation"]["simplified"])
+        self.assertIn("a reflection", failures["rotation"]["shrunk"])
         # As it says: orthogonal, with the sign of the determinant.
         self.assertLess(numpy.linalg.det(polar(numpy.diag([1.0, 1.0, -1.0]))[0]), 0)
 
@@ -183,22 +183,22 @@ class ScikitImage(Library):
         failures = self.failures(surface=marching_cubes("lorensen", "descent"), cases=200)
         self.assertEqual(set(failures), {"surface shells"})
         self.assertEqual(failures["surface shells"]["size"], "1 particle")
-        self.assertIn("1 shells are inside out", failures["surface shells"]["simplified"])
+        self.assertIn("1 shells are inside out", failures["surface shells"]["shrunk"])
 
     def test_lorensen_with_inside_and_outside_exchanged_has_the_other_polarity(self):
         failures = self.failures(surface=marching_cubes("lorensen", "descent", inside=0.0), cases=200)
         self.assertEqual(set(failures), {"surface shells"})
         self.assertEqual(failures["surface shells"]["size"], "2 particles")
-        self.assertIn("It is right in the other polarity", failures["surface shells"]["simplified"])
+        self.assertIn("It is right in the other polarity", failures["surface shells"]["shrunk"])
 
     def test_lewiner_is_no_manifold_where_its_decision_is_a_tie(self):
         failures = self.failures(surface=marching_cubes("lewiner", "ascent"), cases=60)
         self.assertEqual(set(failures), {"surface", "surface vertices", "surface shells"})
         self.assertEqual(failures["surface"]["size"], "4 particles")
-        self.assertIn("both run from vertex", failures["surface"]["simplified"])
+        self.assertIn("both run from vertex", failures["surface"]["shrunk"])
         # Its own vertices inside of cells are no error, but not on edges of the grid.
-        self.assertIn("lies between the ends of no edge", failures["surface vertices"]["simplified"])
-        self.assertIn("It is right in the other polarity", failures["surface shells"]["simplified"])
+        self.assertIn("lies between the ends of no edge", failures["surface vertices"]["shrunk"])
+        self.assertIn("It is right in the other polarity", failures["surface shells"]["shrunk"])
 
     def test_the_witness_by_itself(self):
         from skimage.measure import marching_cubes as march
@@ -218,7 +218,7 @@ class ScikitImage(Library):
                                random.uniform(0, 0.4, volume.shape)).astype(numpy.float32)
 
         with self.assertRaises(cutproof.Failed) as caught:
-            judge(surface=marching_cubes("lewiner", "ascent", value=any_values), cases=2000, simplify=0)
+            judge(surface=marching_cubes("lewiner", "ascent", value=any_values), cases=2000, shrink=0)
         found = {each["property"]: each for each in caught.exception.document["operations"][0]["properties"]}
         self.assertEqual(found["surface"]["failed"], 0)
         self.assertGreater(found["surface"]["checked"], 100000)

@@ -85,7 +85,7 @@ class Test(unittest.TestCase):
         self.addCleanup(self.folder.cleanup)
 
     def judge(self, **options):
-        return cutproof.judge(**{"save": self.folder.name, "simplify": 3, "cases": 60, "sizes": (), **options})
+        return cutproof.judge(**{"save": self.folder.name, "shrink": 3, "cases": 60, "sizes": (), **options})
 
     def failure(self, expected=cutproof.Failed, **options):
         """The text, and what failed by property."""
@@ -194,7 +194,7 @@ class Operations(Test):
     def test_labels_in_16_bits_are_found_in_a_large_question(self):
         text, failures = self.failure(components=lambda t, alive: numpy.arange(len(alive)).astype("u2").astype("i4")
                                       if len(t.edge_ends) == 0 else labels_by_union_find(t, alive), sizes=(65537,),
-                                      simplify=0)
+                                      shrink=0)
         self.assertIn("fails in the question of size 65537 (many vertices without edges)", text)
         self.assertIn("0 and 65536 both have the label 0", failures["components"]["text"])
 
@@ -284,7 +284,7 @@ class Answers(Test):
     """What is wrong with an answer is named."""
 
     def says(self, text, **functions):
-        _, failures = self.failure(simplify=0, **functions)
+        _, failures = self.failure(shrink=0, **functions)
         self.assertIn(text, failures["answers"]["text"])
 
     def test_labels(self):
@@ -359,7 +359,7 @@ class Answers(Test):
         def raises(tissue, alive):
             raise ValueError("ü\n" * 1000)
 
-        _, failures = self.failure(components=raises, simplify=0)
+        _, failures = self.failure(components=raises, shrink=0)
         self.assertTrue(failures["answers"]["text"].startswith("it raised ValueError: ü ü"))
         self.assertLess(len(failures["answers"]["text"].encode()), 512)
 
@@ -367,10 +367,10 @@ class Answers(Test):
         def raises(tissue, alive):
             raise ValueError
 
-        text, _ = self.failure(components=raises, simplify=0)
+        text, _ = self.failure(components=raises, shrink=0)
         self.assertIn("given up after 10 questions", text)
         with self.assertRaises(cutproof.Failed) as caught:
-            self.judge(components=raises, simplify=0, keep_going=True)
+            self.judge(components=raises, shrink=0, keep_going=True)
         self.assertGreaterEqual(caught.exception.document["operations"][0]["not_answered"], 60)
 
     def test_who_refuses_everything_has_passed_nothing(self):
@@ -395,7 +395,7 @@ class Inputs(Test):
         writers = {"alive": lambda t, alive: alive.fill(False), "rest": lambda t, alive: t.rest.fill(0),
                    "edge_ends": lambda t, alive: t.edge_ends.fill(0)}
         for name, write in writers.items():
-            _, failures = self.failure(components=write, simplify=0)
+            _, failures = self.failure(components=write, shrink=0)
             self.assertIn("it raised ValueError: assignment destination is read-only", failures["answers"]["text"])
 
     def test_who_writes_all_the_same_is_found(self):
@@ -404,7 +404,7 @@ class Inputs(Test):
             ctypes.memset(a.ctypes.data, 0, 4)
             return r
 
-        _, failures = self.failure(rotations=with_pointers, simplify=0)
+        _, failures = self.failure(rotations=with_pointers, shrink=0)
         self.assertEqual(failures["answers"]["text"], "it wrote to 'a', which is an input")
 
         def before_or_behind(a, previous):
@@ -412,7 +412,7 @@ class Inputs(Test):
             ctypes.memset(a.ctypes.data + (-1 if a.ctypes.data % 4096 else a.nbytes), 0, 1)
             return r
 
-        _, failures = self.failure(rotations=before_or_behind, simplify=0)
+        _, failures = self.failure(rotations=before_or_behind, shrink=0)
         self.assertRegex(failures["answers"]["text"], "it wrote to byte 1 (before the beginning|behind the end) of 'a'")
 
     def test_they_are_no_copies(self):
@@ -493,7 +493,7 @@ class Program(Test):
             cutproof.replay(os.path.join(self.folder.name, "none.json"), rotations=rotations_by_svd)
 
     def test_replay_of_what_is_not_offered(self):
-        _, failures = self.failure(rotations=lambda a, p: p, simplify=0)
+        _, failures = self.failure(rotations=lambda a, p: p, shrink=0)
         with self.assertRaisesRegex(cutproof.Error, "does not have this operation"):
             cutproof.replay(failures["best rotation"]["file"], components=labels_by_union_find)
 
@@ -508,7 +508,7 @@ class Program(Test):
                 time.sleep(0.01)
 
         begin = time.monotonic()
-        text, failures = self.failure(components=hangs, clusters=an_edge_each, time_limit=0.5, simplify=0)
+        text, failures = self.failure(components=hangs, clusters=an_edge_each, time_limit=0.5, shrink=0)
         self.assertLess(time.monotonic() - begin, 20)
         self.assertEqual(failures["answers"]["text"], "it did not answer within 0.5 s")
         self.assertIn("time.sleep(0.01)", text)

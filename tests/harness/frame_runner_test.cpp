@@ -205,7 +205,7 @@ TEST(PartialBackend, ThatRunsWholeFramesOfBodiesThatMoveIsJudgedByFuzz) {
   EXPECT_EQ(campaign.stages.left(), std::vector<std::string>{});
   const harness::PropertySummary* const step = campaign.properties.find("admissible step", Stage::step);
   ASSERT_NE(step, nullptr);
-  EXPECT_LE(static_cast<double>(step->undecided), 0.01 * static_cast<double>(step->checked));
+  EXPECT_LE(static_cast<double>(step->inconclusive), 0.01 * static_cast<double>(step->checked));
 }
 
 // A tenth of a radian, in frames that cut.

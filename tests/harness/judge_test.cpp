@@ -865,7 +865,7 @@ TEST(StagesInOnePiece, ThatLeaveSeveralRightAnswersAreJudgedByTheOracleWhereItCa
     EXPECT_THAT(failures(right), IsEmpty()) << first_failure(right);
     EXPECT_EQ(counted(right)["stages in one piece"], 1);
     EXPECT_EQ(counted(right)["merge legality"], unique ? 1 : 2) << "of the other frame that cuts, and of this";
-    for (const Verdict& verdict : right) EXPECT_EQ(verdict.undecided, 0) << verdict.property;
+    for (const Verdict& verdict : right) EXPECT_EQ(verdict.inconclusive, 0) << verdict.property;
     const Counts found = failures(split_and_merge_joined(rule, reach_far).judged());
     EXPECT_TRUE(found.contains(unique ? "stages in one piece" : "merge legality"));
     const Counts unsplit =
@@ -899,13 +899,13 @@ TEST(StagesInOnePiece, ThatNobodyCanTellApartAreCounted) {
       in_whole_frames(SceneRun(kEveryStage, [](cutproof::Setup& setup) { setup.merge.rule = MergeRule::published; }));
   const auto verdicts = run.judged();
   EXPECT_THAT(failures(verdicts), IsEmpty()) << first_failure(verdicts);
-  int64_t undecided = 0;
+  int64_t inconclusive = 0;
   for (const Verdict& verdict : verdicts) {
     if (verdict.property != "stages in one piece") continue;
     EXPECT_GT(verdict.checked, 0) << "all but the clusters was compared";
-    undecided += verdict.undecided;
+    inconclusive += verdict.inconclusive;
   }
-  EXPECT_GT(undecided, 0);
+  EXPECT_GT(inconclusive, 0);
 }
 
 // --- Rotations through a cut of which only the end is seen
@@ -1031,16 +1031,16 @@ TEST(WholeFrames, LeaveOpenTheRotationsOfWhatIsGoneAlone) {
           in_whole_frames(SceneRun(kEveryStage, *backend, [&](cutproof::Setup& setup) { setup.merge.rule = rule; }));
       const auto verdicts = run.judged();
       EXPECT_THAT(failures(verdicts), IsEmpty()) << first_failure(verdicts);
-      int64_t undecided = 0, checked = 0, clusters = 0;
+      int64_t inconclusive = 0, checked = 0, clusters = 0;
       for (const Verdict& verdict : verdicts) {
         if (verdict.property != "admissible step") continue;
-        undecided += verdict.undecided;
+        inconclusive += verdict.inconclusive;
         checked += verdict.checked;
       }
       for (const Moment& moment : run.moments) {
         if (!moment.after->removed.empty()) clusters += moment.before->clusters.count();
       }
-      EXPECT_LT(undecided, clusters / 2) << undecided << " of " << clusters << " clusters";
+      EXPECT_LT(inconclusive, clusters / 2) << inconclusive << " of " << clusters << " clusters";
       EXPECT_GT(checked, clusters);
     }
   }

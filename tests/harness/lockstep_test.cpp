@@ -262,7 +262,7 @@ TEST(APlantedDeviation, OfWhatWasLoadedIsFound) {
   EXPECT_FALSE(verdict_named(against, "lockstep: topology").holds);
 }
 
-// --- Undecidable ----------------------------------------------------------------------------------------------------
+// --- Inconclusive ----------------------------------------------------------------------------------------------------
 
 TEST(WithinItsRounding, ARemovalIsUndecidableInLockstepAndExplainedRunningFreely) {
   // The body stretched so that one edge is longer than ε h by a quarter of a rounding in single precision.
@@ -337,7 +337,7 @@ TEST(WithinItsRounding, TheSideOfTheBladeIsUndecidable) {
   EXPECT_TRUE(against.holds()) << failures(against);
   EXPECT_GT(against.lockstep->frames().front().undecidable.otherwise, 0);
   // Of most particles the place where they end tells on which side they began; of those beside the cutting edge not.
-  EXPECT_LT(against.lockstep->frames().front().undecidable.undecided, built.setup.body.particle_count() / 20);
+  EXPECT_LT(against.lockstep->frames().front().undecidable.inconclusive, built.setup.body.particle_count() / 20);
   EXPECT_GT(against.lockstep->frames().front().error(Measure::position).count, 0);
   // In double precision there is no such excuse.
   EXPECT_FALSE(compare(backend, built, 1, AgainstMode::lockstep).holds());

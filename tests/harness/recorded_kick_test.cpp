@@ -259,7 +259,7 @@ TEST(Kick, InNoiseHoldsIfNothingElseHappens) {
       EXPECT_EQ(report.kicks[0].kick_frame, 4);
       // Noise that begins late has not shown how far it grows.
       EXPECT_EQ(report.judged_frames, kFrames - in_again);
-      EXPECT_EQ(verdict_on(report, "no ghost force").undecided, 3 * in_again);
+      EXPECT_EQ(verdict_on(report, "no ghost force").inconclusive, 3 * in_again);
     }
   }
 }

@@ -49,7 +49,7 @@ nlohmann::json result(int64_t shard, int64_t shards) {
                                     {"checked", 60},
                                     {"failed", 0},
                                     {"seconds", 0.5},
-                                    {"undecided", 1},
+                                    {"inconclusive", 1},
                                     {"measured", 0.5},
                                     {"of_bound", 0.25},
                                     {"unit", "h"}});

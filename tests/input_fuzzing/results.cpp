@@ -53,7 +53,7 @@ nlohmann::json verdict(const std::string& property, bool holds) {
   nlohmann::json one = {{"property", property}, {"stage", "split"}, {"backend", "host"},
                         {"frame", 3},           {"body", 0},        {"holds", holds},
                         {"measured", 0.5},      {"bound", "inf"},   {"unit", "h"},
-                        {"checked", 7},         {"undecided", 2},   {"bound_source", "a page"}};
+                        {"checked", 7},         {"inconclusive", 2},   {"bound_source", "a page"}};
   if (!holds)
     one["witness"] = {
         {"text", "there"}, {"clusters", {1}}, {"particles", {2, 3}}, {"path", {2, 4, 3}}, {"triangles", {0, 1}}};
@@ -82,7 +82,7 @@ std::vector<std::string> seeds() {
                     {"free_running", nullptr}};
   run["errors"] = {{"solver", {{"frames", {{{"frame", 0}, {"max", 0.1}}}}}}, {"time_step", {{"rms", {0.1, nullptr}}}}};
   const nlohmann::json property = {{"property", "coverage"}, {"stage", "split"}, {"unit", "1"},    {"judged", 3},
-                                   {"checked", 9},           {"failed", 1},      {"undecided", 2}, {"measured", 1},
+                                   {"checked", 9},           {"failed", 1},      {"inconclusive", 2}, {"measured", 1},
                                    {"of_bound", nullptr}};
   const nlohmann::json campaign = {{"format", "cutproof.fuzz"},
                                    {"format_version", 4},
@@ -110,7 +110,7 @@ std::vector<std::string> seeds() {
                                       {"text", "all of it"},
                                       {"file", "a.json"},
                                       {"drawn", {{"particles", 90}, {"strokes", 4}}},
-                                      {"simplified", {{"particles", 2}, {"strokes", 1}}}}}}};
+                                      {"shrunk", {{"particles", 2}, {"strokes", 1}}}}}}};
   const nlohmann::json times = {{"median", 0.002}, {"min", 0.001}, {"max", 0.003}};
   const nlohmann::json head = {
       {"format", "cutproof.bench"}, {"format_version", 3}, {"cutproof", "0.1.0"}, {"backend", "host"},

@@ -259,10 +259,10 @@ TEST(DetectionOfNearerEnd, CountsWhatUnknownRotationsLeaveOpen) {
   };
   const std::vector<uint8_t> negative = {0, 0, 1, 0}, positive = {0, 0, 0, 1};
   EXPECT_NE(judged(negative, true).holds, judged(positive, true).holds);
-  EXPECT_EQ(judged(negative, true).undecided, 0);
+  EXPECT_EQ(judged(negative, true).inconclusive, 0);
   for (const std::vector<uint8_t>& gone : {negative, positive}) {
     EXPECT_TRUE(judged(gone, false).holds);
-    EXPECT_EQ(judged(gone, false).undecided, 1);
+    EXPECT_EQ(judged(gone, false).inconclusive, 1);
   }
   for (const std::vector<uint8_t>& gone : std::vector<std::vector<uint8_t>>{{0, 0, 0, 0}, {0, 0, 1, 1}, {0, 1, 1, 0}}) {
     EXPECT_FALSE(judged(gone, false).holds);
@@ -288,7 +288,7 @@ TEST(DetectionOfOneEnd, AcceptsWhatOneChoiceOfRoundingGivesAndNothingElse) {
 }
 
 // A long row with every edge at the limit: too much to try, so every particle must have an explanation of its own, and
-// counts as undecided. What no choice gives is rejected still.
+// counts as inconclusive. What no choice gives is rejected still.
 TEST(DetectionOfOneEnd, CountsWhatItCannotTryAsUndecided) {
   constexpr int32_t kLong = 40;
   Pair pair = one_end(pair_of(block_body(kLong, 1, 1), {range(0, kLong)}, {range(0, kLong)}));
@@ -299,7 +299,7 @@ TEST(DetectionOfOneEnd, CountsWhatItCannotTryAsUndecided) {
   remove_particles(all.after, range(0, kLong - 1));  // all edges are open
   const Verdict verdict = detection(all.setup, all.before, all.after);
   expect_holds(verdict);
-  EXPECT_EQ(verdict.undecided, kLong);
+  EXPECT_EQ(verdict.inconclusive, kLong);
   EXPECT_TRUE(accepts(pair, {}));
   EXPECT_FALSE(accepts(pair, {kLong - 1})) << "it is never the lower end";
   // One edge of them is open beyond doubt, so it must lose an end.
@@ -318,7 +318,7 @@ TEST(DetectionOfOneEnd, AsksBluntlyWhereAParticleAloneHangsOnTooMuch) {
   pair.after.x = pair.before.x;
   const Verdict none = detection(pair.setup, pair.before, pair.after);
   expect_holds(none);
-  EXPECT_EQ(none.undecided, 125);
+  EXPECT_EQ(none.inconclusive, 125);
   EXPECT_TRUE(accepts(pair, range(0, 124)));
   // The middle is pulled out of its place: all its edges are too long, nobody has more, and it is lower than some.
   pair.before.x[62] += Vec3{0, 0, 9};

@@ -82,7 +82,7 @@ TEST(Iterates, OfTheReferenceHoldWithEveryCauseAtWork) {
           right.only_frames = !shows;
           const Verdict verdict = judged(right, scene);
           expect_holds(verdict);
-          EXPECT_EQ(verdict.undecided, 0);
+          EXPECT_EQ(verdict.inconclusive, 0);
           EXPECT_GT(verdict.measured, 0.02) << "the bounds must be near to what they bound";
         }
       }

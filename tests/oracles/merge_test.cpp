@@ -251,7 +251,7 @@ TEST(MergeLegality, DecidesThatThereAreTooFewOfACluster) {
   const Merge short_of_one = dealt_out(kResults, Lists(kResults - 1, {1, 2}), {0, 1, 2});
   const Verdict verdict = merge_legality(short_of_one.pair.setup, short_of_one.pair.before, short_of_one.pair.after);
   expect_rejected(verdict, range(0, kResults), {});
-  EXPECT_EQ(verdict.undecided, 0);
+  EXPECT_EQ(verdict.inconclusive, 0);
 }
 
 // Two of three kinds make a result. There are enough of each kind, and too few of all together.
@@ -262,7 +262,7 @@ TEST(MergeLegality, CountsWhatItCouldNotDecide) {
   const Merge merge = dealt_out(kResults, vanished, {0, 1, 2, 3, 4});
   const Verdict verdict = merge_legality(merge.pair.setup, merge.pair.before, merge.pair.after);
   EXPECT_TRUE(verdict.holds) << verdict.witness.text;
-  EXPECT_EQ(verdict.undecided, kResults);
+  EXPECT_EQ(verdict.inconclusive, kResults);
 }
 
 TEST(MergeMaximality, RejectsASmallClusterThatSharesAParticleWithOneThatHasRoom) {

@@ -51,7 +51,7 @@ TEST(AdmissibleStep, IsTheReferencesWithEveryCauseAtWork) {
         const StepScene scene = pressed_block(solver, acceleration, retardation);
         const Verdict verdict = admissible_step(scene.setup, scene.before, scene.after);
         expect_holds(verdict);
-        EXPECT_EQ(verdict.undecided, 0);
+        EXPECT_EQ(verdict.inconclusive, 0);
         EXPECT_GT(verdict.measured, 0.01 * verdict.bound) << "the bound must be near to what it bounds";
         EXPECT_LT(verdict.bound, 1e-11) << "[h]";
       }
@@ -250,7 +250,7 @@ TEST(AdmissibleStep, IsOneOutcomeForAllThatIsCoupled) {
   ASSERT_GT(norm(mixed.x[3] - pair.outcomes[0].x[3]), 1e-3 * kSpacing);
   const Verdict verdict = admissible_step(pair.scene.setup, pair.scene.before, mixed);
   EXPECT_FALSE(verdict.holds);
-  EXPECT_EQ(verdict.undecided, 0);
+  EXPECT_EQ(verdict.inconclusive, 0);
 }
 
 TEST(AdmissibleStep, IsNotWhatOnlyATieCouldExcuse) {
@@ -281,7 +281,7 @@ TEST(AdmissibleStep, TakesManyTiesAsTheyWereAndExcusesNothingElse) {
     round_to_single(setup.body, led.after);
     const Verdict verdict = admissible_step(setup, scene.before, led.after);
     expect_holds(verdict);
-    EXPECT_EQ(verdict.undecided, 0);
+    EXPECT_EQ(verdict.inconclusive, 0);
     if (substeps > 1) continue;
     State wrong = led.after;
     wrong.v[0].y += 0.1 * kSpacing / setup.substep_length[0];
@@ -302,7 +302,7 @@ TEST(AdmissibleStep, TakesManyTiesAsTheyWereAndExcusesNothingElse) {
 }
 
 // The blade is gone before the step ends, so that no place tells on which side 225 particles began. All that is coupled
-// with them is undecided, up to where any sides could lead: where each side is a coin's, and where a backend has to be
+// with them is inconclusive, up to where any sides could lead: where each side is a coin's, and where a backend has to be
 // ten roundings off to see the other one.
 TEST(AdmissibleStep, LeavesOpenWhatHangsOnSidesOfWhichNoPlaceTells) {
   for (const double off : {0.0, 8e-8}) {
@@ -325,7 +325,7 @@ TEST(AdmissibleStep, LeavesOpenWhatHangsOnSidesOfWhichNoPlaceTells) {
     round_to_single(setup.body, led.after);
     const Verdict verdict = admissible_step(setup, scene.before, led.after);
     expect_holds(verdict);
-    EXPECT_GE(verdict.undecided, scene.setup.body.particle_count());
+    EXPECT_GE(verdict.inconclusive, scene.setup.body.particle_count());
     State wrong = led.after;
     wrong.x[2].y += 20 * kSpacing;
     EXPECT_FALSE(admissible_step(setup, scene.before, wrong).holds);
@@ -421,7 +421,7 @@ TEST(AdmissibleStep, TakesALayerOnAWallAsOneRoundingPutsIt) {
     round_to_single(setup.body, taken.after);
     const Verdict verdict = admissible_step(setup, scene.before, taken.after);
     expect_holds(verdict);
-    EXPECT_EQ(verdict.undecided, 0);
+    EXPECT_EQ(verdict.inconclusive, 0);
     taken.setup.step.stiffness *= 0.1;
     taken.take_step();
     round_to_single(setup.body, taken.after);

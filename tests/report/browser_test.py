@@ -238,9 +238,9 @@ def dots_say(page):
         assert len(plot.find_elements(By.CSS_SELECTOR, ".axis")) == 2
 
 
-run([program, "fuzz", "--backend", "plugin:./libsplitter.so", "--cases", "200", "--seed", "5", "--simplify", "5",
+run([program, "fuzz", "--backend", "plugin:./libsplitter.so", "--cases", "200", "--seed", "5", "--shrink", "5",
      "--report", "campaign.html", "--json", "campaign.json"], 1)
-run([program, "judge", "./libsplitter.so", "--cases", "80", "--seed", "5", "--simplify", "5", "--report",
+run([program, "judge", "./libsplitter.so", "--cases", "80", "--seed", "5", "--shrink", "5", "--report",
      "judged.html"], 1)
 run([program, "fuzz", "--cases", "30", "--sizes", "0-9", "--report", "good.html"], 0)
 run([program, "tune", "halves.json", "--tolerance", "100", "--frames", "2", "--reference", "substeps", "--repeats", "1",

@@ -23,9 +23,9 @@ namespace {
 
 using nlohmann::json;
 
-json property(const std::string& name, int64_t failed, int64_t undecided = 0, int64_t judged = 3) {
+json property(const std::string& name, int64_t failed, int64_t inconclusive = 0, int64_t judged = 3) {
   return {{"property", name}, {"stage", "split"},       {"unit", "h"},     {"judged", judged}, {"checked", 9 * judged},
-          {"failed", failed}, {"undecided", undecided}, {"measured", 2.0}, {"of_bound", 0.5}};
+          {"failed", failed}, {"inconclusive", inconclusive}, {"measured", 2.0}, {"of_bound", 0.5}};
 }
 
 json campaign(const std::vector<json>& properties, const std::vector<json>& violations = {}) {
@@ -60,7 +60,7 @@ TEST(ACampaign, WithoutViolationSaysSoPlainly) {
   EXPECT_NE(sheet.summary.find("none violates any property, in 12,345 verdicts"), std::string::npos) << sheet.summary;
   EXPECT_TRUE(sheet.cards.empty());
   const Grid& properties = grid_of(sheet, 0);
-  EXPECT_EQ(properties.rows.at(0).cells.at(7), "2 of 27") << "what is undecidable within rounding is said";
+  EXPECT_EQ(properties.rows.at(0).cells.at(7), "2 of 27") << "what is inconclusive within rounding is said";
   EXPECT_EQ(properties.rows.at(1).cells.at(2), "nothing to look at");
   EXPECT_NE(sheet.notes.at(0).find("2 of the things"), std::string::npos);
 }
@@ -118,16 +118,16 @@ TEST(ACampaign, HasACardForEachViolationWithWhatRemainsOfItsCase) {
                           {"witness", "here"},
                           {"file", "a.json"},
                           {"drawn", {{"particles", 812}, {"strokes", 5}}},
-                          {"simplified", {{"particles", 3}, {"strokes", 1}}}};
+                          {"shrunk", {{"particles", 3}, {"strokes", 1}}}};
   const Sheet sheet = sheet_of(campaign({property("coverage", 1)}, {violation}), "f");
   ASSERT_EQ(sheet.cards.size(), 1u);
   EXPECT_EQ(sheet.cards[0].title, "coverage after split");
   EXPECT_EQ(sheet.cards[0].words, "here");
   EXPECT_EQ(sheet.cards[0].facts.at(2).second, "from 812 particles and 5 strokes to 3 particles and 1 stroke");
   json simpler = violation;
-  simpler["simplified"]["witness"] = "there";
+  simpler["shrunk"]["witness"] = "there";
   EXPECT_EQ(sheet_of(campaign({property("coverage", 1)}, {simpler}), "f").cards.at(0).words, "there")
-      << "the counterexample shows the simplified case";
+      << "the counterexample shows the shrunk case";
   EXPECT_EQ(grid_of(sheet, 0).rows.at(0).kind, "bad") << "what fails comes first";
 }
 
@@ -250,7 +250,7 @@ json campaign_row(const std::string& backend, const json& of_reference, int viol
             {"violations", violations},
             {"refused", 0},
             {"checked", 20000000},
-            {"undecided", 12},
+            {"inconclusive", 12},
             {"positions", of_reference.is_null() ? json(nullptr) : json(900000)},
             {"greatest_h", of_reference.is_null() ? json(nullptr) : json(2e-5)}}}};
 }

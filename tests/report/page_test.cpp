@@ -184,16 +184,16 @@ TEST(Results, BeginWithWhatFailsFirst) {
 TEST(Results, AddUpWhatVerdictsOfOnePropertyLookedAtAndLeftOpen) {
   std::vector<json> verdicts = {verdict("near", "step", 0, true, 0.9, 1), verdict("near", "step", 1, true, 0.5, 1),
                                 verdict("near", "step", 2, true, 0, 0)};
-  verdicts[0]["undecided"] = 2;
-  verdicts[1]["undecided"] = 1;
+  verdicts[0]["inconclusive"] = 2;
+  verdicts[1]["inconclusive"] = 1;
   verdicts[2]["checked"] = 0;
-  verdicts[2]["vacuous"] = "nothing is alive";
+  verdicts[2]["nothing_judged"] = "nothing is alive";
   const Results results = results_of(document(verdicts), "f");
   ASSERT_EQ(results.rows.size(), 1u);
   const PropertyRow& row = results.rows.front();
   EXPECT_EQ(row.checked, 6);
   EXPECT_EQ(row.judged, 2) << "one looked at nothing";
-  EXPECT_EQ(row.undecided, 3);
+  EXPECT_EQ(row.inconclusive, 3);
   EXPECT_EQ(row.vacuous, "") << "others looked";
   EXPECT_EQ(row.frame, 0);
   EXPECT_EQ(results.verdicts, 3);
