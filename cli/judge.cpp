@@ -156,8 +156,8 @@ void print_properties(const KernelCampaign& campaign) {
         u.failing > 0 ? fmt::format(" (would fail in {} questions)", u.failing) : "");
   }
   for (const NotAsked& each : campaign.not_asked) {
-    say("  {}: {} of size {}: that of size {} took {:.2g} s, and --time-limit may be reached\n", inconclusive("not asked"),
-        each.kind, each.size, each.size_before, each.seconds);
+    say("  {}: {} of size {}: that of size {} took {:.2g} s, and --time-limit may be reached\n",
+        inconclusive("not asked"), each.kind, each.size, each.size_before, each.seconds);
   }
   if (campaign.refused > 0) {
     say("  {}: {} questions, without a verdict\n", inconclusive("refused"), campaign.refused);

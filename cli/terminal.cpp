@@ -210,8 +210,8 @@ void print_the_rest(const std::vector<Row>& rows, const Shown& shown) {
                                      io::grouped(row.expected), io::grouped(row.verdicts), row.first_expected->frame));
     }
     if (row.inconclusive > 0) {
-      unsure.push_back(
-          fmt::format("{} of {} in {}", io::grouped(row.inconclusive), io::grouped(row.checked), name_of_row(row, shown)));
+      unsure.push_back(fmt::format("{} of {} in {}", io::grouped(row.inconclusive), io::grouped(row.checked),
+                                   name_of_row(row, shown)));
     }
   }
   for (const Row& row : rows) {

@@ -4,8 +4,8 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <utility>
 #include <string_view>
+#include <utility>
 
 #include "model/error.h"
 #include "model/nearest_word.h"
@@ -36,7 +36,8 @@ std::string_view letters_of(std::string_view option) {
 }
 
 // Words that people may try, and the field's word.
-constexpr std::pair<std::string_view, std::string_view> kOtherWords[] = {{"simplify", "shrink"}, {"minimize", "shrink"}};
+constexpr std::pair<std::string_view, std::string_view> kOtherWords[] = {{"simplify", "shrink"},
+                                                                         {"minimize", "shrink"}};
 
 std::string option_meant(const std::string& given, const std::vector<std::string>& names) {
   std::vector<std::string_view> letters;

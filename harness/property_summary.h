@@ -15,12 +15,12 @@ struct PropertySummary {
   std::string property;
   Stage stage = Stage::skin;
   std::string unit;
-  int64_t judged = 0;     // verdicts that looked at something, or fail
-  int64_t checked = 0;    // things that they looked at
-  int64_t failed = 0;     // expected or not
+  int64_t judged = 0;        // verdicts that looked at something, or fail
+  int64_t checked = 0;       // things that they looked at
+  int64_t failed = 0;        // expected or not
   int64_t inconclusive = 0;  // of what was checked (Verdict::inconclusive)
-  double seconds = 0;     // of judging, by all threads (Verdict::took)
-  double measured = 0;    // greatest
+  double seconds = 0;        // of judging, by all threads (Verdict::took)
+  double measured = 0;       // greatest
   // Greatest measured / bound. Empty if every bound is 0, as for counts.
   std::optional<double> of_bound;
 };

@@ -44,7 +44,7 @@ struct Verdict {
   std::string bound_source;  // where the bound comes from, e.g. "method.md §2, I1"
   int64_t checked = 0;       // how many things were looked at; 0 means the property was vacuous here
   std::string vacuous = {};  // why there was nothing to look at, e.g. "no blade"; empty if there was
-  int64_t inconclusive = 0;     // how many things may be wrong and were not found to be: they count as right, and here
+  int64_t inconclusive = 0;  // how many things may be wrong and were not found to be: they count as right, and here
   Witness witness;           // empty if it holds
   JudgingTime took = {};     // 0 where it was not measured, or where an earlier verdict is repeated
 

@@ -84,8 +84,8 @@ inline constexpr StageOracle component_momentum{"component momentum", Stage::ste
 inline constexpr StageOracle motion{"motion", Stage::step};
 // The step, computed again from the state before it, by an oracle that shares no line with any backend: where every
 // particle, velocity, rotation and the impulse may be, given the rounding of the state's precision. Where a decision is
-// inconclusive, all coupled quantities have wider bounds. `measured` and `bound` as above; `inconclusive` counts what no
-// sharp bound was asked of.
+// inconclusive, all coupled quantities have wider bounds. `measured` and `bound` as above; `inconclusive` counts what
+// no sharp bound was asked of.
 inline constexpr StageOracle admissible_step{"admissible step", Stage::step, motion_properties};
 inline constexpr StageOracle detection{"detection",
                                        Stage::detect};  // removed <=> as the criterion says, outside the band

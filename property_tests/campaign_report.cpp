@@ -37,7 +37,7 @@ constexpr double kMostCounted = 1e12;  // by one shard, of anything
 // Counts and measurements of a result, and those that are summed over shards.
 constexpr const char* kCounts[] = {"cases", "refused", "verdicts", "particles"};
 constexpr const char* kCountsOfSteps[] = {"steps", "particles", "not_compared"};  // within steps_compared
-constexpr const char* kOfThreads[] = {"generating", "running", "judging"};       // within thread_seconds
+constexpr const char* kOfThreads[] = {"generating", "running", "judging"};        // within thread_seconds
 
 constexpr const char* kRemedy = "give the results (--json) of all shards of one campaign, each once";
 
@@ -411,7 +411,8 @@ CampaignConclusion conclude(const json& document, bool whole) {
   }
   for (const json& property : document.at("properties")) {
     if (property.at("property") != oracles::kStepByIterates) continue;
-    const double inconclusive = property.at("inconclusive").get<double>(), checked = property.at("checked").get<double>();
+    const double inconclusive = property.at("inconclusive").get<double>(),
+                 checked = property.at("checked").get<double>();
     if (inconclusive <= kMostUndecided * checked) continue;
     return {fmt::format("of {:.0f} comparisons of '{}' after {} {:.0f} were inconclusive, so too little was tested",
                         checked, property.at("property").get<std::string>(), property.at("stage").get<std::string>(),

@@ -1,5 +1,5 @@
-// Campaigns as documents (docs/reference/schemas/fuzz.json): one for each shard, merged to one of the whole campaign, and its
-// conclusion.
+// Campaigns as documents (docs/reference/schemas/fuzz.json): one for each shard, merged to one of the whole campaign,
+// and its conclusion.
 #pragma once
 #include <nlohmann/json.hpp>
 #include <string>

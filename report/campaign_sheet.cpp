@@ -155,10 +155,11 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
   if (refused > 0)
     sheet.notes.push_back(fmt::format("The backend refused {}: nothing is known of them.", cases_in_words(refused)));
   if (properties.inconclusive > 0)
-    sheet.notes.push_back(fmt::format(
-        "Inconclusive within rounding: {} of the things that were looked at may be wrong and were not found to be; they "
-        "count as right, and the table says of which properties.",
-        io::grouped(properties.inconclusive)));
+    sheet.notes.push_back(
+        fmt::format("Inconclusive within rounding: {} of the things that were looked at may be wrong and were not "
+                    "found to be; they "
+                    "count as right, and the table says of which properties.",
+                    io::grouped(properties.inconclusive)));
   if (const Field steps = document["steps_compared"]; steps.is_there())
     sheet.notes.push_back(fmt::format(
         "{} steps were compared with the reference's: {} positions at most {} h apart, and {} that rounding may carry "

@@ -149,8 +149,9 @@ PropertyTable property_table(const Field& properties) {
     table.judged += looked || fails;
     table.inconclusive += inconclusive;
     const std::string result = fails ? "fails" : looked ? "holds" : "nothing to look at";
-    const std::string doubt =
-        inconclusive > 0 ? fmt::format("{} of {}", io::grouped(inconclusive), io::grouped(checked)) : std::string("none");
+    const std::string doubt = inconclusive > 0
+                                  ? fmt::format("{} of {}", io::grouped(inconclusive), io::grouped(checked))
+                                  : std::string("none");
     all.push_back({fails    ? 0
                    : looked ? 1
                             : 2,

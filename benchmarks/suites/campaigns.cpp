@@ -91,7 +91,7 @@ json compared_in(const CampaignOptions& asked, const Campaign& campaign, bool is
   }
   json error = {{"verdicts", campaign.verdicts}, {"violations", campaign.violations.size()},
                 {"refused", campaign.refused},   {"checked", checked},
-                {"inconclusive", inconclusive},        {"positions", nullptr},
+                {"inconclusive", inconclusive},  {"positions", nullptr},
                 {"greatest_h", nullptr}};
   if (asked.dynamics && !is_the_reference) {
     error["positions"] = campaign.compared.particles;

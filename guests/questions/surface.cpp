@@ -355,9 +355,9 @@ struct Between {
 
 struct Sides {
   std::vector<Between> between;
-  int64_t outer = 0, inner = 0;        // shells, by the sign of their volume
+  int64_t outer = 0, inner = 0;           // shells, by the sign of their volume
   int64_t checked = 0, inconclusive = 0;  // nodes; on the surface within rounding
-  int64_t wrong = 0, inside_out = 0;   // nodes; shells whose triangles turn the wrong way
+  int64_t wrong = 0, inside_out = 0;      // nodes; shells whose triangles turn the wrong way
   std::string first_wrong;
 };
 

@@ -32,10 +32,10 @@ double position_bound(const Body& body);
 // Inconclusive differences, where rounding explains both answers: counted, and not measured where they exceed the
 // required accuracy of positions.
 struct Undecidable {
-  int64_t removals = 0;   // particles removed by one only, within the rounding band of detection
-  int64_t otherwise = 0;  // decisions of steps that the backend has taken, within rounding, as the reference has not
-  int64_t positions = 0;  // particles that the rounding of a step carries farther than a bound, or makes faster
-  int64_t rotations = 0;  // clusters, the same
+  int64_t removals = 0;      // particles removed by one only, within the rounding band of detection
+  int64_t otherwise = 0;     // decisions of steps that the backend has taken, within rounding, as the reference has not
+  int64_t positions = 0;     // particles that the rounding of a step carries farther than a bound, or makes faster
+  int64_t rotations = 0;     // clusters, the same
   int64_t inconclusive = 0;  // of positions: too far for a sharp bound (Verdict::inconclusive)
 
   void join(const Undecidable& other);

@@ -224,8 +224,8 @@ Setup disturbed(Setup setup, double amount) {
 }
 
 // Particles whose life depends on a disturbance of the input: decisions inside the rounding band among them.
-std::vector<uint8_t> inconclusive(Backend& backend, const Setup& setup, const State& state, Span span, const State& result,
-                               uint64_t seed) {
+std::vector<uint8_t> inconclusive(Backend& backend, const Setup& setup, const State& state, Span span,
+                                  const State& result, uint64_t seed) {
   std::vector<uint8_t> undecidable(state.alive.size(), 0);
   const auto note = [&](const State& other) {
     for (const int32_t i : decided_differently(result, other)) undecidable[at(i)] = 1;

@@ -1,6 +1,6 @@
 // Whether a step ends within rounding of the method, judged from its first and last state. Where rounding explains both
-// answers of a decision, everything coupled with it is inconclusive (docs/design/tolerances.md, The step again). Backends
-// that show iterates are judged more sharply: oracles/iterates/. Internal to oracles/.
+// answers of a decision, everything coupled with it is inconclusive (docs/design/tolerances.md, The step again).
+// Backends that show iterates are judged more sharply: oracles/iterates/. Internal to oracles/.
 #pragma once
 #include <cstdint>
 #include <optional>

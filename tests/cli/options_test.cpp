@@ -70,6 +70,7 @@ TEST_F(Options, SayWhatWasMeant) {
            {"fuz", {"did you mean 'fuzz'?"}},
            {"run --frams 3 s.json", {"--frams", "did you mean '--frames'?", "cutproof run --help"}},
            {"run s.json --recrod=x", {"--recrod:", "did you mean '--record'?"}},
+           {"fuzz --simplify 3", {"--simplify", "did you mean '--shrink'?"}},
            {"tune s.json --tolerence 1", {"--tolerence", "did you mean '--tolerance'?"}},
            {"bench solver --sampels 3", {"did you mean '--samples'?", "cutproof bench solver --help"}},
            {"bench solvr", {"solvr", "did you mean 'solver'?"}},

@@ -1358,8 +1358,8 @@ TEST_F(JudgeVerb, FindsFaultsOfWidthByDefaultAndSavesTheirSize) {
   EXPECT_TRUE(contains(again.output, "0 and 65536 both have the label 0")) << again.output;
   EXPECT_EQ(run(fmt::format("judge {} --case {}", PLUGIN_in_c, file)).status, 0);
 
-  EXPECT_EQ(run(fmt::format("judge {} components --parameters first_16384 --cases 1 --shrink 0 --save {}",
-                            PLUGIN_in_c, folder_))
+  EXPECT_EQ(run(fmt::format("judge {} components --parameters first_16384 --cases 1 --shrink 0 --save {}", PLUGIN_in_c,
+                            folder_))
                 .status,
             1);
   const std::string narrow =

@@ -227,8 +227,7 @@ TEST_F(WrongRecording, WhoseBodyAndSkinAreShiftedInOneFrame) {
       RecordedScene recorded(kFallingScene, *reference_, single ? one_substep : unchanged);
       recorded.keep_ends_of_frames();
       for (std::size_t k = 2; k < recorded.snapshots.size(); ++k) shift(recorded.snapshots[k].state, {by, 0, 0});
-      EXPECT_THAT(failing(*recorded.judged()), IsSupersetOf({"motion", "admissible step"}))
-          << by << " m, " << single;
+      EXPECT_THAT(failing(*recorded.judged()), IsSupersetOf({"motion", "admissible step"})) << by << " m, " << single;
     }
   }
   RecordedScene recorded(kFallingScene, *reference_);

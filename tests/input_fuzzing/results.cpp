@@ -50,10 +50,10 @@ Outcome feed(std::string_view bytes) {
 }
 
 nlohmann::json verdict(const std::string& property, bool holds) {
-  nlohmann::json one = {{"property", property}, {"stage", "split"}, {"backend", "host"},
-                        {"frame", 3},           {"body", 0},        {"holds", holds},
-                        {"measured", 0.5},      {"bound", "inf"},   {"unit", "h"},
-                        {"checked", 7},         {"inconclusive", 2},   {"bound_source", "a page"}};
+  nlohmann::json one = {{"property", property}, {"stage", "split"},  {"backend", "host"},
+                        {"frame", 3},           {"body", 0},         {"holds", holds},
+                        {"measured", 0.5},      {"bound", "inf"},    {"unit", "h"},
+                        {"checked", 7},         {"inconclusive", 2}, {"bound_source", "a page"}};
   if (!holds)
     one["witness"] = {
         {"text", "there"}, {"clusters", {1}}, {"particles", {2, 3}}, {"path", {2, 4, 3}}, {"triangles", {0, 1}}};
@@ -81,7 +81,7 @@ std::vector<std::string> seeds() {
                     {"lockstep", {{"frames", {{"frame", {0}}, {"position_max", {1e-7}}}}}},
                     {"free_running", nullptr}};
   run["errors"] = {{"solver", {{"frames", {{{"frame", 0}, {"max", 0.1}}}}}}, {"time_step", {{"rms", {0.1, nullptr}}}}};
-  const nlohmann::json property = {{"property", "coverage"}, {"stage", "split"}, {"unit", "1"},    {"judged", 3},
+  const nlohmann::json property = {{"property", "coverage"}, {"stage", "split"}, {"unit", "1"},       {"judged", 3},
                                    {"checked", 9},           {"failed", 1},      {"inconclusive", 2}, {"measured", 1},
                                    {"of_bound", nullptr}};
   const nlohmann::json campaign = {{"format", "cutproof.fuzz"},

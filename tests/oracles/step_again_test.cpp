@@ -302,8 +302,8 @@ TEST(AdmissibleStep, TakesManyTiesAsTheyWereAndExcusesNothingElse) {
 }
 
 // The blade is gone before the step ends, so that no place tells on which side 225 particles began. All that is coupled
-// with them is inconclusive, up to where any sides could lead: where each side is a coin's, and where a backend has to be
-// ten roundings off to see the other one.
+// with them is inconclusive, up to where any sides could lead: where each side is a coin's, and where a backend has to
+// be ten roundings off to see the other one.
 TEST(AdmissibleStep, LeavesOpenWhatHangsOnSidesOfWhichNoPlaceTells) {
   for (const double off : {0.0, 8e-8}) {
     SCOPED_TRACE(off);

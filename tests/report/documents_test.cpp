@@ -24,8 +24,15 @@ namespace {
 using nlohmann::json;
 
 json property(const std::string& name, int64_t failed, int64_t inconclusive = 0, int64_t judged = 3) {
-  return {{"property", name}, {"stage", "split"},       {"unit", "h"},     {"judged", judged}, {"checked", 9 * judged},
-          {"failed", failed}, {"inconclusive", inconclusive}, {"measured", 2.0}, {"of_bound", 0.5}};
+  return {{"property", name},
+          {"stage", "split"},
+          {"unit", "h"},
+          {"judged", judged},
+          {"checked", 9 * judged},
+          {"failed", failed},
+          {"inconclusive", inconclusive},
+          {"measured", 2.0},
+          {"of_bound", 0.5}};
 }
 
 json campaign(const std::vector<json>& properties, const std::vector<json>& violations = {}) {
