@@ -347,8 +347,7 @@ def make_schedule(scene, body):
     setup = types.SimpleNamespace(blade=None, substeps=S, walls=[types.SimpleNamespace(
         axis=w["axis"], side=w["side"], friction=w["friction"], offset=low[w["axis"]] + w["offset"] * extent[w["axis"]])
         for w in scene["walls"]])
-    settle, count = whole(scene["frame"]["settle"] / F), scene["frame"]["count"]
-    frames, strokes_end = [], 0  # a frame of the scene: its substeps' poses, or the pose of a blade that is up
+    frames, strokes_end, count = [], 0, scene["frame"]["count"]  # a frame of the scene: its substeps' poses, or the pose of a blade that is up
     if "blade" in scene:  # M9.4
         blade = setup.blade = make_blade(scene, body, place, extent)
         strokes = [substeps_of_stroke(s, place, blade, scene["blade"]["speed"], F, S) for s in scene["blade"]["strokes"]]
@@ -358,11 +357,12 @@ def make_schedule(scene, body):
             if k + 1 < len(strokes):
                 frames += [strokes[k + 1][0](0)] * whole(scene["blade"]["strokes"][k]["pause"] / F)  # M9.8
         strokes_end = len(frames)
-        frames += [strokes[-1][-1](1)] * settle
+        rest, settle = strokes[-1][-1](1), whole(scene["frame"]["settle"] / F)
     else:
-        frames += [None] * (whole(max([g["end"] for g in scene["grips"]] + [0]) / F) + settle)
+        rest, settle = None, whole(max([g["end"] for g in scene["grips"]] + [0]) / F) + whole(scene["frame"]["settle"] / F)
+    frames += [rest] * (max(settle, count - len(frames)))
     if count > 0:
-        frames = frames[:count] + [frames[-1] if frames else None] * (count - len(frames))
+        frames = frames[:count]
 
     setup.frames, times = [], []  # of the simulation: dt and one move per substep
     for k, frame in enumerate(frames):
@@ -696,15 +696,15 @@ def distance_to(points, origin, vectors):
         return np.linalg.norm(d, axis=1)
     V = np.array(vectors)
     gram = V @ V.T
-    best = np.full(len(points), np.inf)
+    best, inside = np.full(len(points), np.inf), np.zeros(len(points), bool)
     if np.linalg.det(gram) > 1e-24 * np.prod(np.diag(gram)):
         s = np.linalg.solve(gram, V @ d.T)
         inside = ((s >= 0) & (s <= 1)).all(axis=0)
-        best = np.where(inside, np.linalg.norm(d - s.T @ V, axis=1), best)
+        best[inside] = np.linalg.norm(d - s.T @ V, axis=1)[inside]
     for k in range(len(V)):
         rest = [v for j, v in enumerate(vectors) if j != k]
         for at in (origin, origin + V[k]):
-            best = np.minimum(best, np.where(best < np.inf, best, distance_to(points, at, rest)))
+            best[~inside] = np.minimum(best, distance_to(points, at, rest))[~inside]
     return best
 
 
