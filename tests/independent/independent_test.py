@@ -1,20 +1,21 @@
 #!/usr/bin/env python3
-"""Holds cutproof against a simulator that shares nothing with it (simulator.py): positions, removals and clusters frame
-by frame at the same substeps; errors and orders of convergence as the time step is refined, with detection in every
-substep; and, with --all, the distances between levels that `cutproof tune --reference limit` prints. Simulators that are
-wrong on purpose have to be rejected, or nothing was shown.
+"""Runs small scenes by cutproof's reference and by a simulator that shares nothing with it (simulator.py), both from the
+scene, and compares setups and every frame: what is counted or chosen exactly, what is measured within rounding. Then
+simulators that are wrong in one line (wrong.py) have to be noticed, or nothing was shown.
 
-Usage: independent_test.py CUTPROOF SOURCE WORK [--all] [--only PART...] [--json FILE]
+Usage: independent_test.py CUTPROOF SOURCE WORK [--only SCENE...]     CUTPROOF_WHOLE=1: every scene and every wrong line
 Ends with 77 where numpy or h5py is missing."""
 import argparse
 import json
-import math
+import os
 import pathlib
 import shutil
 import subprocess
 import sys
 import time
+import types
 
+os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"  # matrices are small, and cores are shared
 try:
     import h5py  # noqa: F401
     import numpy as np
@@ -23,231 +24,171 @@ except ImportError as missing:
     sys.exit(77)
 
 sys.dont_write_bytecode = True  # nothing is left in the source tree
-from measures import Trajectory, apart, errors, orders, rounding_bound
 from recording import Recording
-from simulator import Simulator, Wrong
+from scenes import SCENES, SHORT
+from wrong import WRONG
 
-ORDER_TOLERANCE = 0.1
-LEAST_ORDER = 0.7  # with retardation
-PARTS = ("trajectories", "orders", "solved", "printed", "wrong")
-
-parser = argparse.ArgumentParser()
-parser.add_argument("program", type=pathlib.Path)
-parser.add_argument("source", type=pathlib.Path)
-parser.add_argument("work", type=pathlib.Path)
-parser.add_argument("--all", action="store_true", help="twelve scenes, deeper levels, and the levels that tune prints")
-parser.add_argument("--only", nargs="+", default=PARTS, choices=PARTS)
-parser.add_argument("--json", type=pathlib.Path, help="write what was measured")
-options = parser.parse_args()
-program, work = options.program.resolve(), options.work.resolve()
-shutil.rmtree(work, ignore_errors=True)
-work.mkdir(parents=True)
-failures, document = [], {}
+U = 2.0**-53
+KINDS = ("positions", "velocities", "rotations", "impulses", "skin", "reaches")
 
 
-def check(holds, what):
-    if not holds:
-        failures.append(what)
-        print("  FAILS:", what)
+class Bounds:
+    """What rounding explains, for two programs, in the units of positions (m), velocities and so on.
+
+    An iteration rounds a coordinate of at most E some eight times, each time by u E: the means and moments of clusters,
+    rotations, goals, combination, contacts. Acceleration passes an error of iteration j on by at most K + 1 - j (Chebyshev
+    polynomials of the second kind on [0, 1]); so a substep adds e = 2 · 8 u E K (K + 1) / 2. An error e of positions is one
+    e / dt of velocities, which later substeps add up: N e / dt, and e N (N + 1) / 2 for positions after N substeps. A
+    rotation turns by at most 24 / g times the relative error (of N's entries: 6 dx / h), g being the gap of its
+    eigenvalues (M12.1). A cut vertex multiplies errors of height by at most 16 (M8.3: slope 4 |d0 - d1| of f in t)."""
+
+    def __init__(self, simulator, extent, substeps, dt):
+        K = max(1, simulator.scene["step"]["iterations"])
+        h, e = simulator.body.h, 16 * U * extent * K * (K + 1) / 2
+        self.x = e * substeps * (substeps + 1) / 2 + 4 * U * extent
+        self.v = e * substeps / dt
+        self.impulse = self.v * simulator.body.mass.sum()
+        self.rotation = 24 * self.x / h / simulator.gap + 8 * U
+        self.skin, self.reach = 16 * self.x, 16 * self.x / h
+        self.center = 16 * U * extent
 
 
-def scene_path(scene):
-    return options.source.resolve() / "fixtures/scenes" / f"{scene}.json"
+class Comparison:
+    """Of one scene. `problem` says what differs first; `worst` has greatest deviations and their shares of the bound."""
+
+    def __init__(self, recording, simulator):
+        self.recording, self.simulator, self.problem, self.worst, self.removed = recording, simulator, None, {}, 0
+        self.setup()
+        self.substeps, self.extent, self.dt = 0, 0.0, 1e9
+        for frame in range(len(recording.ends)):
+            if self.problem is None:
+                if frame:
+                    self.dt = min(self.dt, simulator.setup.frames[frame - 1][0])
+                    self.substeps += simulator.setup.substeps
+                    simulator.run_frame()
+                self.state(frame, recording.state(frame))
+
+    def exactly(self, what, theirs, ours):
+        if self.problem is None and not np.array_equal(np.asarray(theirs), np.asarray(ours)):
+            self.problem = f"{what} differ"
+
+    def within(self, what, theirs, ours, bound, unit=1):
+        if self.problem is None:
+            theirs, ours = np.asarray(theirs, float), np.asarray(ours, float)
+            if theirs.shape != ours.shape:
+                self.problem = f"{what}: {theirs.shape} and {ours.shape} numbers"
+            elif theirs.size:
+                deviation = abs(theirs - ours)
+                kind = what.split(": ")[-1]
+                share = np.max(deviation / np.reshape(bound, np.shape(bound) + (1,) * (deviation.ndim - np.ndim(bound))))
+                old = self.worst.get(kind, (0, 0))
+                self.worst[kind] = max(old[0], deviation.max() / unit), max(old[1], share)
+                if not share <= 1:
+                    self.problem = f"{what} differ by {deviation.max() / unit:.1e}, {share:.1e} times the bound"
+
+    def setup(self):
+        theirs, ours, body = self.recording.setup, self.simulator.setup, self.simulator.body
+        self.exactly("nodes", theirs["body/node"], body.node)
+        self.exactly("crossings", theirs["body/surface_crossing"], body.crossing.ravel() if self.simulator.scene["body"]["fit_skin"] else [])
+        self.exactly("numbers of frames", len(theirs["substep_length"]), len(ours.frames))
+        small = 64 * U
+        length = max(1.0, abs(body.rest).max())
+        self.within("masses", theirs["body/mass"], body.mass, small * body.mass[0], body.mass[0])
+        self.within("substep lengths", theirs["substep_length"], [dt for dt, _ in ours.frames], small)
+        self.within("walls", theirs["walls/offset"], [wall.offset for wall in ours.walls], small * length)
+        for what, column in (("particles", [g.particles for g in ours.grips]), ("active", [g.active for g in ours.grips])):
+            self.exactly(f"{what} of grips", theirs[f"grips/{what}"], np.concatenate([[]] + column))
+        self.exactly("blades", theirs["blade"].attrs["present"], ours.blade is not None)
+        if ours.blade is not None and self.problem is None:
+            for name in ("length", "depth", "thickness", "friction"):
+                self.within(f"{name} of the blade", theirs["blade"].attrs[name], getattr(ours.blade, name), small)
+            moves = [move for _, moves in ours.frames for move in moves]
+            self.exactly("lowered blades", theirs["blade_moves/down"], [move.down for move in moves])
+            for end, column in (("from", "before"), ("to", "after")):
+                for part in ("edge", "along", "back"):
+                    poses = [getattr(getattr(move, column), part) for move in moves]
+                    self.within(f"poses of the blade ({part})", theirs[f"blade_moves/{end}_{part}"], poses, small * len(moves))
+
+    def state(self, frame, theirs):
+        ours, h = self.simulator, self.simulator.body.h
+        at = f"frame {frame}: "
+        self.extent = max(self.extent, abs(theirs.x).max(), ours.setup.blade.length if ours.setup.blade else 0)
+        bounds = Bounds(ours, self.extent, self.substeps, self.dt)
+        for what in ("removed", "debris", "alive", "tau", "cap", "edge_covered"):
+            self.exactly(at + what, getattr(theirs, what), getattr(ours, what))
+        if self.problem is None and theirs.clusters != [sorted(c.members) for c in ours.clusters]:
+            self.problem = at + f"clusters differ ({len(theirs.clusters)} and {len(ours.clusters)})"
+        self.exactly(at + "numbers of clusters", theirs.numbers, [c.number for c in ours.clusters])
+        self.exactly(at + "ambiguous rotations", theirs.flags, [c.flag for c in ours.clusters])
+        self.within(at + "rest centres", theirs.centers, ours.cover.T, bounds.center, h)
+        self.within(at + "masses of clusters", theirs.masses, ours.cover.M, 64 * U * ours.cover.M)
+        self.within(at + "positions", theirs.x, ours.x, bounds.x, h)
+        self.within(at + "velocities", theirs.v, ours.v, bounds.v or U)
+        self.within(at + "impulses", theirs.impulse, ours.impulse, bounds.impulse or U)
+        self.within(at + "rotations", theirs.rotations, [c.rotation for c in ours.clusters], bounds.rotation.max())
+        self.removed += len(theirs.removed) + len(theirs.debris)
+        if frame and ours.skin is not None:
+            for what in ("owner", "direction", "triangles"):
+                self.exactly(at + f"skin ({what})", getattr(theirs, what), getattr(ours.skin, what))
+            self.within(at + "reaches", theirs.reach, ours.skin.reach, bounds.reach)
+            self.within(at + "skin", theirs.skin, ours.skin.positions, bounds.skin, h)
+        elif self.problem is None and len(theirs.owner):
+            self.problem = at + "a skin in one alone"
 
 
-def recorded(scene, frames=None, **settings):
-    """Made by the program. Settings: substeps=8 for step.substeps=8."""
-    command = [program, "run", scene_path(scene), "--record", "run", "--set", "skin.wanted=false"]
-    for name, value in settings.items():
-        command += ["--set", f"{'detect' if name in ('every', 'remove') else 'step'}.{name}={value}"]
-    done = subprocess.run(command + (["--frames", str(frames)] if frames else []), cwd=work, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return Recording(work / "run")
+def record(program, work, name, scene):
+    path = work / name
+    if not (work / f"{name}.cutproof.h5").exists():
+        path.with_suffix(".json").write_text(json.dumps(scene))
+        done = subprocess.run([program, "run", f"{name}.json", "--backend", "reference", "--record", name], cwd=work,
+                              capture_output=True, text=True)
+        if done.returncode != 0:
+            sys.exit(f"{name}: cutproof fails: {done.stdout}{done.stderr}")
+    return Recording(path)
 
 
-def both(recording, wrong=None, solve_to=None):
-    """The program's trajectory and the independent one, at the ends of the scene's frames. And the first frame of the
-    schedule in which numbers of clusters differ."""
-    length = json.loads(recording.scene).get("frame", {}).get("length", 0.016)
-    ours, theirs = Trajectory(recording.setup.h), Trajectory(recording.setup.h)
-    simulator = Simulator(recording.setup, recording.state, wrong, solve_to)
-    first_difference = None
-    for frame, end in enumerate(recording.times):
-        simulator.run_frame()
-        x, alive, clusters = recording.after(frame)
-        if clusters != len(simulator.cover.sets) and first_difference is None:
-            first_difference = frame
-        if abs(end / length - round(end / length)) < 1e-6:
-            ours.add(round(end / length), x, alive)
-            theirs.add(round(end / length), simulator.x, simulator.alive)
-    return ours, theirs, first_difference
+def variant(source, line, instead):
+    """The module with one line replaced."""
+    if source.count(line) != 1:
+        sys.exit(f"wrong.py: the simulator has {source.count(line)} times: {line}")
+    module = types.ModuleType("wrong_simulator")
+    exec(compile(source.replace(line, instead), "wrong_simulator", "exec"), module.__dict__)
+    return module
 
 
-def trajectories_agree(scene, frames=None, wrong=None, **settings):
-    """What is wrong with it; nothing if they agree."""
-    recording = recorded(scene, frames, **settings)
-    ours, theirs, clusters = both(recording, wrong)
-    found = apart(ours, theirs)
-    substeps = len(recording.times) * recording.setup.substeps
-    bound = rounding_bound(recording.setup, recording.state, substeps)
-    removed = recording.count - int(min(alive.sum() for _, alive in ours.at.values()))
-    print(f"  {scene}{''.join(f', {k}={v}' for k, v in settings.items())}: {recording.count} particles, {len(recording.state.clusters)} clusters, {substeps} substeps, "
-          f"{removed} removed: {found.worst:.1e} h apart at worst, bound {bound:.1e}; {found.differ} removed in one alone"
-          + ("" if clusters is None else f"; other clusters from frame {clusters} on"), flush=True)
-    if wrong is None:
-        document.setdefault("trajectories", []).append(
-            {"scene": scene, "settings": settings, "particles": recording.count, "substeps": substeps, "removed": removed,
-             "worst_h": found.worst, "bound_h": bound, "removed_in_one": found.differ})
-    problems = []
-    if not found.worst <= bound:
-        problems.append(f"{scene}: {found.worst:.1e} h apart, rounding explains {bound:.1e} h")
-    if found.differ:
-        problems.append(f"{scene}: {found.differ} particles are removed in one alone")
-    if clusters is not None:
-        problems.append(f"{scene}: other clusters from frame {clusters} on")
-    return problems
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("program", type=pathlib.Path)
+    parser.add_argument("source", type=pathlib.Path)
+    parser.add_argument("work", type=pathlib.Path)
+    parser.add_argument("--only", nargs="+", choices=SCENES)
+    options = parser.parse_args()
+    whole, program, work = os.environ.get("CUTPROOF_WHOLE") == "1", options.program.resolve(), options.work.resolve()
+    shutil.rmtree(work, ignore_errors=True)
+    work.mkdir(parents=True)
+    source = (pathlib.Path(__file__).parent / "simulator.py").read_text()
+    failures, started = [], time.monotonic()
+    import simulator as right
+    names = options.only or (SCENES if whole else SHORT)
+    for name in names:
+        result = Comparison(record(program, work, name, SCENES[name]), right.Simulator(SCENES[name]))
+        ours, worst = result.simulator, result.worst
+        told = ", ".join(f"{kind} {worst[kind][0]:.0e} ({worst[kind][1]:.0e})" for kind in KINDS if kind in worst)
+        print(f"{name}: {ours.body.count} particles, {ours.frame} frames, {len(ours.clusters)} clusters, {result.removed} removed: {told}", flush=True)
+        if result.problem:
+            failures.append(f"{name}: {result.problem}")
+            print(f"  FAILS: {result.problem}", flush=True)
+    print(f"Simulators that are wrong in one line ({time.monotonic() - started:.0f} s)", flush=True)
+    for requirement, name, line, instead in WRONG:
+        if name in names and (whole or options.only or (requirement, name) in SHORT_WRONG):
+            result = Comparison(record(program, work, name, SCENES[name]), variant(source, line, instead).Simulator(SCENES[name]))
+            print(f"  {requirement} in {name}: {result.problem or 'NOT NOTICED'}", flush=True)
+            if not result.problem:
+                failures.append(f"{requirement} in {name}: a wrong line is not noticed")
+    print(f"{time.monotonic() - started:.0f} s")
+    shutil.rmtree(work, ignore_errors=True)
+    print("all holds" if not failures else "\n".join(["what fails:"] + failures))
+    return 1 if failures else 0
 
 
-def orders_agree(scene, substeps, frames=None, wrong=None, solve_to=None, least=None, **settings):
-    """What is wrong with the orders; nothing if they agree, and, of RMS distances, none is below `least`."""
-    levels = ([], [])
-    for count in substeps:
-        pair = both(recorded(scene, frames, substeps=count, every="substep", **settings), wrong, solve_to)
-        levels[0].append(pair[0])
-        levels[1].append(pair[1])
-    print(f"  {scene}{f', {frames} frames' if frames else ''}{', every substep solved' if solve_to else ''}: distance of "
-          f"{' '.join(f'{n}-{2 * n}' for n in substeps[:-1])} substeps a frame, in h; order")
-    rows, problems = {}, []
-    for who, trajectories in zip(("cutproof", "independent"), levels):
-        found = errors(trajectories)
-        for norm in ("rms", "worst"):
-            values = [getattr(e, norm) for e in found]
-            rows[who, norm] = (values, orders(values))
-            print(f"    {who:11} {norm:5} {' '.join(f'{v:.3e}' for v in values)}; {' '.join(f'{p:.4f}' for p in orders(values))}",
-                  flush=True)
-        print(f"    {who:11} removed in one alone: {' '.join(str(e.differ) for e in found)}")
-        rows[who, "differ"] = [e.differ for e in found]
-    for norm in ("rms", "worst"):
-        for k, (p, q) in enumerate(zip(rows["cutproof", norm][1], rows["independent", norm][1])):
-            if not abs(p - q) <= ORDER_TOLERANCE:
-                problems.append(f"{scene}: order {q:.2f} ({norm}, {substeps[k]} to {4 * substeps[k]} substeps), cutproof "
-                                f"has {p:.2f}")
-            if least is not None and norm == "rms" and not q >= least:
-                problems.append(f"{scene}: order {q:.2f} ({substeps[k]} to {4 * substeps[k]} substeps)")
-    if wrong is None:
-        document.setdefault("orders", []).append(
-            {"scene": scene, "substeps": list(substeps), "frames": frames, "solved": solve_to is not None,
-             "settings": settings, **{f"{who}_{norm}": rows[who, norm] for who, norm in rows}})
-    return problems
-
-
-def printed_orders_agree(scene, frames=None, **settings):
-    """The levels of `cutproof tune --reference limit`, which never come as near as is asked for here, so that it ends
-    before its search; and the same levels by the independent simulator."""
-    command = [program, "tune", scene_path(scene), "--tolerance", "1e-9", "--json", "tune.json", "--set", "skin.wanted=false"]
-    for name, value in settings.items():
-        command += ["--set", f"{'detect' if name in ('every', 'remove') else 'step'}.{name}={value}"]
-    done = subprocess.run(command + (["--frames", str(frames)] if frames else []), cwd=work, capture_output=True, text=True)
-    assert done.returncode == 1, done.stdout + done.stderr
-    levels = json.loads((work / "tune.json").read_text())["reference"]["levels"]
-    trajectories = [both(recorded(scene, frames, substeps=level["substeps"], iterations=level["iterations"],
-                                  acceleration="none", **settings))[1] for level in levels]
-    printed = [level["apart_h"] for level in levels[1:]]
-    own = [e.rms for e in errors(trajectories)]
-    print(f"  {scene}{f', {frames} frames' if frames else ''} ({', '.join(f'{k}={v}' for k, v in settings.items()) or 'as given'}): "
-          f"{' '.join('%d×%d' % (l['substeps'], l['iterations']) for l in levels)}")
-    for who, values in (("cutproof tune", printed), ("independent", own)):
-        print(f"    {who:13} rms {' '.join(f'{v:.3e}' for v in values)}; {' '.join(f'{p:.4f}' for p in orders(values))}", flush=True)
-    document.setdefault("printed", []).append(
-        {"scene": scene, "frames": frames, "settings": settings, "levels": levels, "independent_h": own,
-         "orders": orders(printed), "independent_orders": orders(own)})
-    return [f"{scene}: order {q:.2f}, cutproof tune prints {p:.2f}" for p, q in zip(orders(printed), orders(own))
-            if not abs(p - q) <= ORDER_TOLERANCE]
-
-
-def section(title):
-    print(f"{title} ({time.monotonic() - started:.0f} s)", flush=True)
-
-
-started = time.monotonic()
-if "trajectories" in options.only:
-    section("Frame by frame, beside the program at the same substeps")
-    cases = [("small_block", None), ("three_cuts", 24), ("uniform_stretch", 5), ("cuboid_press", 16)]
-    if options.all:
-        cases = [(scene, None) for scene in (
-            "small_block", "three_cuts", "cuboid_press", "uniform_stretch", "uniform_stretch_strain", "kidney_arc",
-            "kidney_discontinuous", "liver_cut", "irregular_sampled", "irregular_sampled_covered", "cluster_growth",
-            "kidney_37704")]
-    for scene, frames in cases:
-        for problem in trajectories_agree(scene, frames):
-            check(False, problem)
-    for problem in trajectories_agree("small_block", remove="one", every="substep"):
-        check(False, problem)
-    for scene, frames in [("small_block", None), ("cuboid_press", None if options.all else 25),
-                          ("kidney_arc", None if options.all else 5)]:
-        for problem in trajectories_agree(scene, frames, remove="one", retardation=0.004):
-            check(False, problem)
-
-if "orders" in options.only:
-    section("Orders, with detection in every substep")
-    cases = [("uniform_stretch", (8, 16, 32, 64), 2), ("small_block", (4, 8, 16), 12)]
-    if options.all:
-        cases = [("uniform_stretch", (4, 8, 16, 32, 64), 20), ("small_block", (4, 8, 16, 32, 64), None),
-                 ("three_cuts", (4, 8, 16), None), ("cuboid_press", (4, 8, 16), None)]
-    for scene, substeps, frames in cases:
-        for problem in orders_agree(scene, substeps, frames):
-            check(False, problem)
-
-if "orders" in options.only:
-    # With a retardation as long as the time step that scenes are given, implicit Euler is of first order on them.
-    section("Orders with retardation")
-    cases = [("uniform_stretch", (8, 16, 32, 64), 2), ("small_block", (16, 32, 64), 10)]
-    if options.all:
-        cases = [("uniform_stretch", (8, 16, 32, 64), 20), ("small_block", (8, 16, 32, 64), None)]
-    for scene, substeps, frames in cases:
-        for problem in orders_agree(scene, substeps, frames, least=LEAST_ORDER, retardation=0.004, remove="one"):
-            check(False, problem)
-
-if options.all and "solved" in options.only:
-    # The program by iterations enough for every level, the independent one until nothing moves: of the time step alone.
-    section("Orders where every substep is solved")
-    for scene, substeps, frames in [("uniform_stretch", (8, 16, 32, 64, 128, 256), 2), ("small_block", (4, 8, 16, 32), 30)]:
-        for problem in orders_agree(scene, substeps, frames, solve_to=1e-11, iterations=40):
-            check(False, problem)
-
-if options.all and "printed" in options.only:
-    section("Orders that the program prints")
-    for scene, frames, settings in [("uniform_stretch", 4, {}), ("small_block", None, {}),
-                                    ("small_block", 12, {"every": "substep"})]:
-        for problem in printed_orders_agree(scene, frames, **settings):
-            check(False, problem)
-
-if "wrong" in options.only:
-    section("Simulators that are wrong on purpose")
-    for name, scene, frames, wrong in (
-            ("damping a thousandth too strong", "small_block", 3, Wrong(damping=1.001)),
-            ("gravity a substep late", "small_block", 3, Wrong(late_gravity=True)),
-            ("detection a frame late", "small_block", 8, Wrong(detect_late=True)),
-            ("a retardation that is none", "small_block", 3, Wrong(retardation=0)),
-            ("a thousandth too much retardation", "small_block", 3, Wrong(retardation=1.001)),
-            ("what is cut is not split", "three_cuts", 10, Wrong(keep_cut_clusters=True))):
-        print(f" {name}:")
-        retarded = {"retardation": 0.004} if wrong.retardation != 1 else {}
-        check(trajectories_agree(scene, frames, wrong, **retarded), f"{name}: not found")
-    stiff = 1e5 * 0.004**2
-    for name, scene, substeps, frames, wrong in (
-            ("s of 4 ms, whatever the time step", "uniform_stretch", (4, 8, 16), 2, Wrong(relaxation=stiff / (1 + stiff))),
-            ("velocities damped by substeps, not by time", "small_block", (4, 8, 16), 4, Wrong(decay=math.exp(-2 * 0.004)))):
-        print(f" {name}:")
-        # With the scene's own four substeps both are right; only what becomes of it as the time step shrinks tells.
-        check(not trajectories_agree(scene, frames, wrong), f"{name}: not right where it should be")
-        problems = orders_agree(scene, substeps, frames, wrong)
-        check(problems, f"{name}: its order is taken for right")
-        print("    found:", "; ".join(problems))
-
-section("Done")
-if options.json:
-    options.json.write_text(json.dumps(document, indent=1) + "\n")
-shutil.rmtree(work, ignore_errors=True)
-print("all holds" if not failures else "\n".join(["what fails:"] + failures))
-sys.exit(1 if failures else 0)
+sys.exit(main())

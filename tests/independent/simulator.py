@@ -426,7 +426,7 @@ def matrix(q):
 
 
 def rotations(A, last):
-    """M3.4, M12.1: rotations, flags, and the gap between the two greatest eigenvalues (0: ambiguous)."""
+    """M3.4, M12.1: rotations, flags, and the gap below the greatest eigenvalue and its equals."""
     greatest = abs(A).max(axis=(1, 2))
     usable = np.isfinite(A).all(axis=(1, 2)) & (greatest > 0)
     A = np.where(usable[:, None, None], A, 0) / np.where(usable, greatest, 1)[:, None, None]
@@ -442,7 +442,8 @@ def rotations(A, last):
         q[c] = near / length if length >= 1e-9 else space[:, -1]
     R = matrix(q)
     R[~usable] = last[~usable]
-    return R, flags | ~usable, np.where(flags | ~usable, 0, values[:, 3] - values[:, 2])
+    gap = np.where(equal, np.inf, values[:, 3:] - values).min(axis=1)
+    return R, flags | ~usable, gap
 
 
 # ------------------------------------------------------------------------------------------------------ 3. Contacts
@@ -719,7 +720,7 @@ class Simulator:
         self.alive, self.frame, self.substep = np.ones(n, bool), 0, 0
         self.removed = self.debris = []
         self.impulse, self.skin = np.zeros(3), None
-        self.gap = np.zeros(len(self.clusters))
+        self.gap = np.ones(len(self.clusters))
         self.cover = Cover(self.body, self.clusters)
 
     def run_frame(self):
