@@ -25,7 +25,7 @@ except ImportError as missing:
 
 sys.dont_write_bytecode = True  # nothing is left in the source tree
 from recording import Recording
-from scenes import SCENES, SHORT
+from scenes import MESHES, SCENES, SHORT
 from wrong import WRONG
 
 U = 2.0**-53
@@ -93,6 +93,8 @@ class Comparison:
         self.exactly("numbers of frames", len(theirs["substep_length"]), len(ours.frames))
         small = 64 * U
         length = max(1.0, abs(body.rest).max())
+        self.within("orientations", theirs["body"].attrs["orientation"], body.axes.T, 1e-10)
+        self.within("origins", theirs["body"].attrs["origin"], body.origin, 1e-10 * length)
         self.within("masses", theirs["body/mass"], body.mass, small * body.mass[0], body.mass[0])
         self.within("substep lengths", theirs["substep_length"], [dt for dt, _ in ours.frames], small)
         self.within("walls", theirs["walls/offset"], [wall.offset for wall in ours.walls], small * length)
@@ -137,10 +139,13 @@ class Comparison:
 
 
 def record(program, work, name, scene):
-    path = work / name
-    if not (work / f"{name}.cutproof.h5").exists():
-        path.with_suffix(".json").write_text(json.dumps(scene))
-        done = subprocess.run([program, "run", f"{name}.json", "--backend", "reference", "--record", name], cwd=work,
+    folder = work / name
+    path = folder / "run"
+    if not folder.exists():
+        folder.mkdir()
+        (folder / "scene.json").write_text(json.dumps(scene))
+        (folder / "body.obj").write_text(MESHES.get(name, ""))
+        done = subprocess.run([program, "run", "scene.json", "--backend", "reference", "--record", "run"], cwd=folder,
                               capture_output=True, text=True)
         if done.returncode != 0:
             sys.exit(f"{name}: cutproof fails: {done.stdout}{done.stderr}")
@@ -171,7 +176,7 @@ def main():
     import simulator as right
     names = options.only or (SCENES if whole else SHORT)
     for name in names:
-        result = Comparison(record(program, work, name, SCENES[name]), right.Simulator(SCENES[name]))
+        result = Comparison(record(program, work, name, SCENES[name]), right.Simulator(SCENES[name], work / name))
         ours, worst = result.simulator, result.worst
         told = ", ".join(f"{kind} {worst[kind][0]:.0e} ({worst[kind][1]:.0e})" for kind in KINDS if kind in worst)
         print(f"{name}: {ours.body.count} particles, {ours.frame} frames, {len(ours.clusters)} clusters, {result.removed} removed: {told}", flush=True)
@@ -181,7 +186,7 @@ def main():
     print(f"Simulators that are wrong in one line ({time.monotonic() - started:.0f} s)", flush=True)
     for requirement, name, line, instead in WRONG:
         if name in names and (whole or options.only or (requirement, name) in SHORT_WRONG):
-            result = Comparison(record(program, work, name, SCENES[name]), variant(source, line, instead).Simulator(SCENES[name]))
+            result = Comparison(record(program, work, name, SCENES[name]), variant(source, line, instead).Simulator(SCENES[name], work / name))
             print(f"  {requirement} in {name}: {result.problem or 'NOT NOTICED'}", flush=True)
             if not result.problem:
                 failures.append(f"{requirement} in {name}: a wrong line is not noticed")

@@ -1,4 +1,5 @@
 """Small scenes that reach the requirements of docs/design/method.md. Those in SHORT run in every build."""
+import math
 
 
 def block(x, y, z, **more):
@@ -15,7 +16,41 @@ TURNS = [stroke((-0.2, 0.5, -0.2), (0.3, 0.5, -0.2), (0.6, 1.1, -0.2), (0.2, 0.9
 ENDS = [{"low": [0, 0, 0], "high": [0.12, 1, 1]}, {"low": [0.88, 0, 0], "high": [1, 1, 1]}]
 DOWN = {"gravity": [0, 0, -9.81]}
 
+
+
+def prism(ends, height, turn):
+    """An OBJ file of a straight or tapered prism; corners (x, y) of both ends, counter-clockwise; turned by an angle."""
+    n, angle = len(ends[0]), [math.cos(turn), math.sin(turn)]
+    points = [(x, y, z) for end, z in zip(ends, (0, height)) for x, y in end]
+    for a, b in ((0, 1), (1, 2)):
+        points = [tuple(angle[0] * p[a] - angle[1] * p[b] if k == a else angle[1] * p[a] + angle[0] * p[b] if k == b else p[k]
+                        for k in range(3)) for p in points]
+    faces = [(0, k + 1, k) for k in range(1, n - 1)] + [(n, n + k, n + k + 1) for k in range(1, n - 1)]
+    faces += [f for k in range(n) for f in ((k, (k + 1) % n, n + k), ((k + 1) % n, n + (k + 1) % n, n + k))]
+    return "".join("v %r %r %r\n" % p for p in points) + "".join("f %d %d %d\n" % tuple(i + 1 for i in f) for f in faces)
+
+
+def mesh_scene(align, **more):
+    return {"body": {"mesh": {"file": "body.obj", "unit": 0.001}, "spacing": 0.0093, "align": align}, "clusters": {"side": 3}, "frame": {"count": 3},
+            "step": DOWN, "ground": {}, "blade": {"speed": 2, "strokes": [stroke((0.5, 0.5, 1.1), (0.45, 0.5, -0.1), along=[0, 1, 0])]}, **more}
+
+
+def polygon(n, radius):
+    return [(radius * math.cos(2 * math.pi * k / n), radius * math.sin(2 * math.pi * k / n)) for k in range(n)]
+
+
+RECTANGLE = [(0, 0), (80, 0), (80, 50), (0, 50)]
+MESHES = {  # beside the scene of the same name, as body.obj
+    "wedge": prism([RECTANGLE, [(0, 0), (40, 5), (35, 40), (0, 50)]], 30, 0.7),
+    "wedge_as_given": prism([RECTANGLE, [(0, 0), (40, 5), (35, 40), (0, 50)]], 30, 0.7),
+    "brick": prism([RECTANGLE, RECTANGLE], 30, 0.4),
+    "long_prism": prism([polygon(3, 32)] * 2, 90, 0.5),  # two equal moments: the lesser ones
+    "flat_prism": prism([polygon(3, 45)] * 2, 25, 2.1),  # the greater ones
+    "cube": prism([polygon(4, 35)] * 2, 35 * 2**0.5, 0.3),
+}
+
 SCENES = {
+    **{name: mesh_scene(name != "wedge_as_given") for name in MESHES},
     # friction of walls and blade, Chebyshev, `nearer`, cut vertices
     "friction": {
         "body": block(10, 5, 4), "clusters": {"side": 3}, "frame": {"count": 12},
@@ -164,5 +199,5 @@ SCENES = {
 for scene in SCENES.values():
     scene["version"] = 5
 
-SHORT = ("friction", "frictionless", "mixed_walls", "retardation", "grips_alone", "grips_after_strokes", "sampled", "sampled_deep",
+SHORT = ("wedge", "long_prism", "friction", "frictionless", "mixed_walls", "retardation", "grips_alone", "grips_after_strokes", "sampled", "sampled_deep",
          "sampled_published", "arc_fast", "arc_geometric", "corners", "strain", "tilted", "debris", "shapes", "alpha", "slanted_skin", "rods")

@@ -120,8 +120,60 @@ def solid(shape):
     return inside, center - half, center + half
 
 
-def make_body(scene):
-    value, low, high = solid(scene["body"]["shape"])
+def mesh_solid(path, unit_length, align):
+    """M1.6, M1.7 for a sound mesh in an OBJ file: as `solid`, and the frame's origin and axes."""
+    rows = [line.split() for line in path.read_text().splitlines()]
+    corners = unit_length * np.array([row[1:] for row in rows if row[0] == "v"], float)
+    faces_ = np.array([row[1:] for row in rows if row[0] == "f"], int) - 1
+
+    def volumes():  # of tetrahedra with the origin
+        t = corners[faces_]
+        return t, np.linalg.det(t) / 6
+
+    t, volume = volumes()
+    centroid, axes = volume @ t.sum(axis=1) / 4 / volume.sum(), np.eye(3)
+    corners = corners - centroid
+    t, volume = volumes()
+    if align:
+        total = t.sum(axis=1)
+        second = np.einsum("t,tij->ij", volume, np.einsum("tki,tkj->tij", t, t) + total[:, :, None] * total[:, None, :]) / 20 / volume.sum()
+        moments, axes = np.linalg.eigh(second)
+        moments, axes = moments[::-1], axes.T[::-1].copy()
+        equal = [moments[0] - moments[1] <= 1e-6 * moments[0], moments[1] - moments[2] <= 1e-6 * moments[0]]
+        if all(equal):
+            axes = np.eye(3)
+        elif any(equal):
+            third, first = (2, 0) if equal[0] else (0, 1)
+            n = axes[third]
+            e = np.eye(3)[np.argmin(abs(n))]
+            axes[first] = unit(e - (e @ n) * n)
+            axes[first + 1] = np.cross(n, axes[first])
+        if not all(equal):
+            for k in (0, 1):
+                a = (t @ axes[k]).T
+                cubes = (a**3).sum(axis=0) + sum(a[i]**2 * a[j] for i in range(3) for j in range(3) if i != j) + a.prod(axis=0)
+                third_moment = volume @ cubes / 20 / volume.sum()
+                if abs(third_moment) < 1e-6 * moments[k]**1.5:
+                    third_moment = axes[k][np.argmax(abs(axes[k]))]
+                axes[k] *= np.sign(third_moment)
+        axes[2] = np.cross(axes[0], axes[1])
+        corners = corners @ axes.T
+
+    def inside(p):  # half less the winding number
+        a, b, c = np.moveaxis(corners[faces_] - p[:, None, None, :], 2, 0)
+        la, lb, lc = (np.linalg.norm(v, axis=2) for v in (a, b, c))
+        below = la * lb * lc + (a * b).sum(axis=2) * lc + (b * c).sum(axis=2) * la + (c * a).sum(axis=2) * lb
+        return 0.5 - np.arctan2((a * np.cross(b, c)).sum(axis=2), below).sum(axis=1) / (2 * np.pi)
+    return inside, corners.min(axis=0), corners.max(axis=0), centroid, axes
+
+
+def make_body(scene, folder):
+    center, axes = np.zeros(3), np.eye(3)
+    if "mesh" in scene["body"]:
+        mesh = scene["body"]["mesh"]
+        value, low, high, center, axes = mesh_solid(folder / mesh["file"], mesh["unit"], scene["body"]["align"])
+    else:
+        value, low, high = solid(scene["body"]["shape"])
     h = scene["body"]["spacing"]
     counts = np.ceil((high - low) / h).astype(int)
     candidates = np.array(list(itertools.product(*map(range, counts))))
@@ -148,7 +200,8 @@ def make_body(scene):
     i, d = np.nonzero(around[:, ::2] >= 0)
     edges = np.stack([i, around[i, 2 * d]], axis=1)
     return types.SimpleNamespace(h=h, count=n, nodes=nodes, node=np.sort(number), place=place, at=at, rest=h * place.astype(float),
-                                 around=around, crossing=crossing, edges=edges,
+                                 around=around, crossing=crossing, edges=edges, axes=axes,
+                                 origin=center + (low + h * (first + 0.5)) @ axes,
                                  mass=np.full(n, scene["body"]["density"] * h**3))
 
 
@@ -710,9 +763,9 @@ def distance_to(points, origin, vectors):
 
 
 class Simulator:
-    def __init__(self, scene):
+    def __init__(self, scene, folder):
         self.scene = with_defaults(scene)
-        self.body = make_body(self.scene)
+        self.body = make_body(self.scene, folder)
         self.setup = make_schedule(self.scene, self.body)
         self.clusters, self.tau, self.cap, self.edge_covered = cook(self.scene, self.body)
         n = self.body.count
