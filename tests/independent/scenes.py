@@ -102,7 +102,7 @@ SCENES = {
     # sampled clusters, expanded at cooking; an organ; turns at corners; debris; no merging
     "sampled": {
         "seed": 7, "body": {"shape": {"kind": "kidney", "size": [0.11, 0.06, 0.05]}, "spacing": 0.0085}, "frame": {"count": 16},
-        "clusters": {"method": "sampled", "spacing": 2, "radius": 2}, "step": {"iterations": 6, "stiffness": 4e5, "damping": 5},
+        "clusters": {"method": "sampled", "spacing": 2, "radius": 2}, "step": {"iterations": 6, "stiffness": 2e6, "damping": 5},
         "detect": {"remove": "both"}, "split": {"debris": 8}, "merge": {"rule": "none"},
         "grips": [ENDS[0], {"low": [0.9, 0, 0], "high": [1, 1, 1], "velocity": [0.1, 0, 0]}],
         "blade": {"length": 0.3, "depth": 2, "thickness": 0.5, "speed": 1, "strokes": [
@@ -147,7 +147,7 @@ SCENES = {
         "body": block(8, 6, 3), "clusters": {"side": 3}, "step": {"iterations": 6}, "blade": {"length": 0.9, "speed": 4, "friction": 0.6, "strokes": TURNS}},
     "longest_piece": {
         "body": block(8, 6, 3), "clusters": {"side": 3}, "detect": {"criterion": "geometric"}, "blade": {"length": 0.2, "speed": 0.4, "strokes": [
-            stroke((0.1, 0.2, -0.1), (0.395, 0.2, -0.1), (0.694, 0.2, -0.1), (0.8, 0.2, 0.3), along=[0.2, 1, 0.1])]}},
+            stroke((0.1, 0.2, -0.1), (0.395, 0.2, -0.1), (0.694, 0.2, -0.1), (0.8, 0.2, 0.4), along=[0.2, 1, 0.1])]}},
     "divided_and_counted": {
         "body": block(8, 6, 3), "clusters": {"side": 3}, "frame": {"count": 6}, "blade": {"speed": 6, "start": 0.016, "strokes": PRESS}},
     # strain, with and without a blade
@@ -167,6 +167,18 @@ SCENES = {
         "body": block(9, 5, 4), "clusters": {"side": 2, "small": 1.0, "cap": 3}, "split": {"debris": 60}, "frame": {"settle": 0.03},
         "blade": {"speed": 1.4, "strokes": [stroke((0.25, 0.5, 1.1), (0.25, 0.5, -0.1), along=[0, 1, 0], pause=0.01),
                                             stroke((0.5, 0.5, 1.1), (0.7, 0.5, -0.1), along=[0, 1, 0])]}},
+    # a core in two parts; a blade that begins inside tissue; tissue that falls through a plate within a substep
+    "fork": {
+        "body": {"shape": {"kind": "difference", "parts": [{"kind": "box", "size": [0.12, 0.05, 0.05]}, {
+            "kind": "box", "size": [0.1001, 0.01, 0.1], "center": [0.01, 0, 0]}]}, "spacing": 0.01},
+        "frame": {"count": 8}, "step": DOWN, "ground": {"friction": 0.3}, "detect": {"epsilon": 1.4}, "blade": {"speed": 0.7, "strokes": [
+            stroke((0.45, 0.5, 1.1), (0.55, 0.5, -0.15), along=[0, 1, 0])]}},
+    "begun_inside": {
+        "body": block(7, 5, 4), "clusters": {"side": 3}, "step": {"iterations": 6}, "detect": {"criterion": "none"}, "blade": {
+            "speed": 0.9, "length": 0.7, "depth": 0.6, "strokes": [stroke((0.48, 0.5, 0.4), (0.8, 0.5, 0.3), along=[0.02, 1, 0])]}},
+    "fallen": {
+        "body": block(6, 5, 3), "clusters": {"side": 3}, "frame": {"count": 5}, "step": {"gravity": [5, 0, -150]}, "detect": {"criterion": "none"},
+        "blade": {"length": 0.8, "depth": 0.7, "speed": 0.02, "strokes": [stroke((0.1, 0.5, -1.1), (0.12, 0.5, -1.1), along=[0, 1, 0], back=[1, 0, 0])]}},
     # a union without a ball; a skin without cut vertices, or without the body's surface, or none
     "shapes": {
         "body": {"shape": {"kind": "difference", "parts": [{"kind": "union", "parts": [
@@ -200,4 +212,4 @@ for scene in SCENES.values():
     scene["version"] = 5
 
 SHORT = ("wedge", "long_prism", "friction", "frictionless", "mixed_walls", "retardation", "grips_alone", "grips_after_strokes", "sampled", "sampled_deep",
-         "sampled_published", "arc_fast", "arc_geometric", "corners", "strain", "tilted", "debris", "shapes", "alpha", "slanted_skin", "rods")
+         "sampled_published", "arc_fast", "arc_geometric", "corners", "strain", "tilted", "debris", "shapes", "alpha", "slanted_skin", "fork", "begun_inside", "fallen", "rods")
