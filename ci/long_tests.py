@@ -14,7 +14,6 @@ import sys
 
 SHARE = 128
 LONG = (
-    (r"Independent\.TrajectoriesAndOrders", "a step that program and reference both have wrong; orders of convergence"),
     (r"Packaging\.(subdirectory|archive|static)", "that others can build with the libraries, and run what is packed"),
     (r"OfThePaper/Scene\.Holds/.*", "faults where clusters and particles are many; what the paper's scenes come to"),
     (r"Organs/.*", "a mesh of others that cannot be repaired, or a scene on it that fails"),

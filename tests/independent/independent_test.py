@@ -3,7 +3,7 @@
 scene, and compares setups and every frame: what is counted or chosen exactly, what is measured within rounding. Then
 simulators that are wrong in one line (wrong.py) have to be noticed, or nothing was shown.
 
-Usage: independent_test.py CUTPROOF SOURCE WORK [--only SCENE...]     CUTPROOF_WHOLE=1: every scene and every wrong line
+Usage: independent_test.py CUTPROOF WORK [--only SCENE...]     CUTPROOF_WHOLE=1: every scene and every wrong line
 Ends with 77 where numpy or h5py is missing."""
 import argparse
 import json
@@ -33,14 +33,14 @@ KINDS = ("positions", "velocities", "rotations", "impulses", "skin", "reaches")
 
 
 class Bounds:
-    """What rounding explains, for two programs, in the units of positions (m), velocities and so on.
+    """What rounding explains, for two programs, in SI units.
 
-    An iteration rounds a coordinate of at most E some eight times, each time by u E: the means and moments of clusters,
-    rotations, goals, combination, contacts. Acceleration passes an error of iteration j on by at most K + 1 - j (Chebyshev
-    polynomials of the second kind on [0, 1]); so a substep adds e = 2 · 8 u E K (K + 1) / 2. An error e of positions is one
-    e / dt of velocities, which later substeps add up: N e / dt, and e N (N + 1) / 2 for positions after N substeps. A
-    rotation turns by at most 24 / g times the relative error (of N's entries: 6 dx / h), g being the gap of its
-    eigenvalues (M12.1). A cut vertex multiplies errors of height by at most 16 (M8.3: slope 4 |d0 - d1| of f in t)."""
+    An iteration rounds coordinates of at most E some eight times, each time by u E: in means, moments, rotations, goals,
+    combination and contacts. Acceleration passes an error of iteration j on by at most K + 1 - j (Chebyshev polynomials of
+    the second kind on [0, 1]). So two programs part by e = 2 · 8 u E K (K + 1) / 2 in a substep. That is e / dt in
+    velocities, which later substeps add up. After N substeps velocities have parted by N e / dt, positions by e N (N + 1) / 2.
+    With g the gap of eigenvalues (M12.1), a rotation turns by at most 24 dx / (h g): entries of N are off by 6 dx / h.
+    A cut vertex multiplies errors of height by at most 16 (M8.3). Contacts may magnify errors; the factor 8 leaves room."""
 
     def __init__(self, simulator, extent, substeps, dt):
         K = max(1, simulator.scene["step"]["iterations"])
@@ -164,7 +164,6 @@ def variant(source, line, instead):
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("program", type=pathlib.Path)
-    parser.add_argument("source", type=pathlib.Path)
     parser.add_argument("work", type=pathlib.Path)
     parser.add_argument("--only", nargs="+", choices=SCENES)
     options = parser.parse_args()
