@@ -60,13 +60,14 @@ class Program : public testing::Test {
     outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
     return outcome;
   }
-  // `environment`: variables for the program, as a shell writes them. A document that it writes follows its schema.
+  // `environment`: variables for the program, as a shell writes them. With CUTPROOF_WHOLE=1 a document that it
+  // writes follows its schema: 0.3 s each.
   Outcome cutproof(const std::string& arguments, const std::string& environment = "") const {
     const std::string document = document_of(arguments);
     const files::file_time_type before = time_of(document);
     Outcome outcome =
         shell("cd '" + folder_.string() + "' && " + environment + " '" CUTPROOF_PROGRAM "' " + arguments + " 2>&1");
-    if (time_of(document) != before) expect_schema(document);
+    if (std::getenv("CUTPROOF_WHOLE") != nullptr && time_of(document) != before) expect_schema(document);
     return outcome;
   }
   // The file that --json names; empty if it needs quotes.

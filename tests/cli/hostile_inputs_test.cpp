@@ -166,7 +166,7 @@ const std::vector<Hostile>& hostile_inputs() {
        },
        "run scene.json --mesh input",
        {"a pipe"}},
-      {"APipeForAPlugin", make_pipe, "judge ./input", {"no file"}},
+      {"APipeForAPlugin", make_pipe, "judge ./input", {"not a file"}},
       {"APipeToTune", make_pipe, "tune input --tolerance 1", {"a pipe"}},
 
       // --- Scenes

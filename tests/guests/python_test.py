@@ -137,7 +137,7 @@ class Wire(Test):
     def test_only_the_files_of_a_guest_are_taken(self):
         program = os.environ["CUTPROOF"]
         with tempfile.TemporaryFile() as file:
-            for words, problem in (([f"--attached={file.fileno()},{file.fileno()}"], "no socket"),
+            for words, problem in (([f"--attached={file.fileno()},{file.fileno()}"], "not a socket"),
                                    (["--attached=3"], "1 numbers"), ([], "no plugin is given")):
                 done = subprocess.run([program, "judge", *words], capture_output=True, text=True,
                                       pass_fds=(file.fileno(),))

@@ -185,7 +185,7 @@ TEST(ForeignState, MayHaveRestFramesOfPlainMasses) {
     const ForeignVerdicts unsaid = judged(plain);
     EXPECT_THAT(failing(unsaid), ElementsAre("rest frames"));
     EXPECT_THAT(verdict_on(unsaid, "rest frames")->witness.text,
-                HasSubstr("the weights that were asked are mass / number of clusters"));
+                HasSubstr("the requested weights are mass / number of containing clusters"));
     EXPECT_THAT(verdict_on(unsaid, "rest frames")->witness.text, HasSubstr("write the text weights = 'plain'"));
     plain.texts = {{"weights", "plain"}};
     EXPECT_THAT(failing(judged(plain)), IsEmpty());

@@ -513,7 +513,7 @@ TEST(Detection, OfAGeometricCutSaysHowNearTheBladeCame) {
             "removes particles within 0.5 h");
   // The same way, while it turns about its edge's axis by a little.
   for (auto& move : pair.setup.blade_moves) move.to.back = {std::sin(1e-4), 0, std::cos(1e-4)};
-  EXPECT_NE(text_of({7, 12, 17, 22}).find("comes to it is 1.01"), std::string::npos) << text_of({7, 12, 17, 22});
+  EXPECT_NE(text_of({7, 12, 17, 22}).find("comes within 1.01"), std::string::npos) << text_of({7, 12, 17, 22});
   for (auto& move : pair.setup.blade_moves) move.down = false;
   EXPECT_EQ(text_of({7}), "particle 7 was removed, but should not have been: the blade is not down in this frame");
 }
