@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""Runs small scenes by cutproof's reference and by a simulator that shares nothing with it (simulator.py), both from the
-scene, and compares setups and every frame: what is counted or chosen exactly, what is measured within rounding. Then
-simulators that are wrong in one line (wrong.py) have to be noticed, or nothing was shown.
+"""Compares cutproof's reference with a simulator that shares nothing with it (simulator.py).
+
+Both programs run small scenes (scenes.py) from the scene's text. The test compares their setups and each frame: counts and
+choices exactly, measured values within rounding. Simulators that are wrong in one line (wrong.py) have to be noticed.
 
 Usage: independent_test.py CUTPROOF WORK [--only SCENE...]     CUTPROOF_WHOLE=1: every scene and every wrong line
 Ends with 77 where numpy or h5py is missing."""
@@ -89,7 +90,8 @@ class Comparison:
     def setup(self):
         theirs, ours, body = self.recording.setup, self.simulator.setup, self.simulator.body
         self.exactly("nodes", theirs["body/node"], body.node)
-        self.exactly("crossings", theirs["body/surface_crossing"], body.crossing.ravel() if self.simulator.scene["body"]["fit_skin"] else [])
+        fitted = self.simulator.scene["body"]["fit_skin"]
+        self.exactly("crossings", theirs["body/surface_crossing"], body.crossing.ravel() if fitted else [])
         self.exactly("numbers of frames", len(theirs["substep_length"]), len(ours.frames))
         small = 64 * U
         length = max(1.0, abs(body.rest).max())
@@ -177,8 +179,10 @@ def main():
     for name in names:
         result = Comparison(record(program, work, name, SCENES[name]), right.Simulator(SCENES[name], work / name))
         ours, worst = result.simulator, result.worst
+        # Greatest deviations (positions and skin in h), and in brackets their greatest share of the bound.
         told = ", ".join(f"{kind} {worst[kind][0]:.0e} ({worst[kind][1]:.0e})" for kind in KINDS if kind in worst)
-        print(f"{name}: {ours.body.count} particles, {ours.frame} frames, {len(ours.clusters)} clusters, {result.removed} removed: {told}", flush=True)
+        print(f"{name}: {ours.body.count} particles, {ours.frame} frames, {len(ours.clusters)} clusters, {result.removed} removed: "
+              f"{told}", flush=True)
         if result.problem:
             failures.append(f"{name}: {result.problem}")
             print(f"  FAILS: {result.problem}", flush=True)

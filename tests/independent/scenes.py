@@ -179,6 +179,12 @@ SCENES = {
     "fallen": {
         "body": block(6, 5, 3), "clusters": {"side": 3}, "frame": {"count": 5}, "step": {"gravity": [5, 0, -150]}, "detect": {"criterion": "none"},
         "blade": {"length": 0.8, "depth": 0.7, "speed": 0.02, "strokes": [stroke((0.1, 0.5, -1.1), (0.12, 0.5, -1.1), along=[0, 1, 0], back=[1, 0, 0])]}},
+    # nodes on surfaces, in numbers that are exact
+    "on_surfaces": {
+        "body": {"shape": {"kind": "difference", "parts": [{"kind": "union", "parts": [
+            {"kind": "box", "size": [8 / 128, 4 / 128, 4 / 128]}, {"kind": "box", "size": [3 / 128] * 3, "center": [5 / 128, 0, 0]}]},
+            {"kind": "box", "size": [3 / 128] * 3, "center": [0, 0, 2 / 128]}]}, "spacing": 1 / 128},
+        "clusters": {"side": 3}, "frame": {"count": 2}, "step": DOWN, "ground": {}},
     # cubes that touch along an edge and at a corner: ambiguous faces
     "diagonal": {
         "body": {"shape": {"kind": "union", "parts": [{"kind": "box", "size": [0.03, 0.03, 0.03], "center": c} for c in (
@@ -217,4 +223,4 @@ for scene in SCENES.values():
     scene["version"] = 5
 
 SHORT = ("wedge", "long_prism", "friction", "frictionless", "mixed_walls", "retardation", "grips_alone", "grips_after_strokes", "sampled", "sampled_deep",
-         "sampled_published", "arc_fast", "arc_geometric", "corners", "strain", "tilted", "debris", "shapes", "alpha", "slanted_skin", "fork", "diagonal", "begun_inside", "fallen", "rods")
+         "sampled_published", "arc_fast", "arc_geometric", "corners", "strain", "tilted", "debris", "shapes", "alpha", "slanted_skin", "fork", "on_surfaces", "diagonal", "begun_inside", "fallen", "rods")

@@ -136,7 +136,8 @@ def mesh_solid(path, unit_length, align):
     t, volume = volumes()
     if align:
         total = t.sum(axis=1)
-        second = np.einsum("t,tij->ij", volume, np.einsum("tki,tkj->tij", t, t) + total[:, :, None] * total[:, None, :]) / 20 / volume.sum()
+        squares = np.einsum("tki,tkj->tij", t, t) + total[:, :, None] * total[:, None, :]
+        second = np.einsum("t,tij->ij", volume, squares) / 20 / volume.sum()
         moments, axes = np.linalg.eigh(second)
         moments, axes = moments[::-1], axes.T[::-1].copy()
         equal = [moments[0] - moments[1] <= 1e-6 * moments[0], moments[1] - moments[2] <= 1e-6 * moments[0]]
@@ -151,8 +152,8 @@ def mesh_solid(path, unit_length, align):
         if not all(equal):
             for k in (0, 1):
                 a = (t @ axes[k]).T
-                cubes = (a**3).sum(axis=0) + sum(a[i]**2 * a[j] for i in range(3) for j in range(3) if i != j) + a.prod(axis=0)
-                third_moment = volume @ cubes / 20 / volume.sum()
+                mixed = sum(a[i]**2 * a[j] for i in range(3) for j in range(3) if i != j)
+                third_moment = volume @ ((a**3).sum(axis=0) + mixed + a.prod(axis=0)) / 20 / volume.sum()
                 if abs(third_moment) < 1e-6 * moments[k]**1.5:
                     third_moment = axes[k][np.argmax(abs(axes[k]))]
                 axes[k] *= np.sign(third_moment)
@@ -199,7 +200,8 @@ def make_body(scene, folder):
             crossing[:, d] = np.where(around[:, d] < 0, np.clip(outside // 2, 16, 240), 0)
     i, d = np.nonzero(around[:, ::2] >= 0)
     edges = np.stack([i, around[i, 2 * d]], axis=1)
-    return types.SimpleNamespace(h=h, count=n, nodes=nodes, node=np.sort(number), place=place, at=at, rest=h * place.astype(float),
+    return types.SimpleNamespace(h=h, count=n, nodes=nodes, node=np.sort(number), place=place, at=at,
+                                 rest=h * place.astype(float),
                                  around=around, crossing=crossing, edges=edges, axes=axes,
                                  origin=center + (low + h * (first + 0.5)) @ axes,
                                  mass=np.full(n, scene["body"]["density"] * h**3))
@@ -400,7 +402,7 @@ def make_schedule(scene, body):
     setup = types.SimpleNamespace(blade=None, substeps=S, walls=[types.SimpleNamespace(
         axis=w["axis"], side=w["side"], friction=w["friction"], offset=low[w["axis"]] + w["offset"] * extent[w["axis"]])
         for w in scene["walls"]])
-    frames, strokes_end, count = [], 0, scene["frame"]["count"]  # a frame of the scene: its substeps' poses, or the pose of a blade that is up
+    frames, strokes_end, count = [], 0, scene["frame"]["count"]  # each: its substeps' poses, or one pose: the blade is up
     if "blade" in scene:  # M9.4
         blade = setup.blade = make_blade(scene, body, place, extent)
         strokes = [substeps_of_stroke(s, place, blade, scene["blade"]["speed"], F, S) for s in scene["blade"]["strokes"]]
@@ -738,8 +740,9 @@ def expand(body, clusters, alive, rule, depth):
     taken = [c.members | layer for c, layer in zip(clusters, layers)]
     for _ in range(depth - 1):
         for k, layer in enumerate(layers):
-            layers[k] = {q for p in layer for q in body.around[p].tolist() if q >= 0 and alive[q] and of[p] & of[q]} - taken[k]
-            taken[k] |= layers[k]
+            near = {q for p in layer for q in body.around[p].tolist() if q >= 0 and alive[q] and of[p] & of[q]}
+            layers[k] = near - taken[k]
+            taken[k] |= near
     return [Cluster(c.number, members, c.rotation, c.flag) for c, members in zip(clusters, taken)]
 
 
@@ -977,15 +980,17 @@ class Simulator:
             reach = np.where(body.crossing[owner, direction] > 0, body.crossing[owner, direction] / 256, o["alpha"])  # M8.2
             if o["fit_cuts"] and self.plane is not None:
                 reach = np.where(died[other], self.cut_reach(owner, direction), reach)
-            old = {} if self.skin is None else dict(zip(zip(self.skin.owner.tolist(), self.skin.direction.tolist()), self.skin.reach))
-            reach = np.array([old.get(key, a) for key, a in zip(zip(owner.tolist(), direction.tolist()), reach)])
-            self.skin = types.SimpleNamespace(owner=owner, direction=direction, reach=reach, triangles=triangles(body, self.alive, owner, direction))
+            old, keys = {} if self.skin is None else self.skin.reaches, list(zip(owner.tolist(), direction.tolist()))
+            reach = np.array([old.get(key, a) for key, a in zip(keys, reach)])
+            self.skin = types.SimpleNamespace(owner=owner, direction=direction, reach=reach, reaches=dict(zip(keys, reach)),
+                                              triangles=triangles(body, self.alive, keys))
         self.skin.positions = self.skin_positions(self.skin.owner, self.skin.direction, self.skin.reach)
 
     def cut_reach(self, owner, direction):
         """M8.3."""
         alpha = self.scene["skin"]["alpha"]
-        d0, d1 = (self.height(self.skin_positions(owner, direction, np.full(len(owner), float(a)))) / self.body.h for a in (0, 1))
+        reaches = np.zeros(len(owner)), np.ones(len(owner))
+        d0, d1 = (self.height(self.skin_positions(owner, direction, a)) / self.body.h for a in reaches)
         with np.errstate(divide="ignore", invalid="ignore"):
             t = d0 / (d0 - d1)
         fits = (-1 < t) & (t < 3)
@@ -1034,9 +1039,9 @@ def cell_triangles(inside):
     return found
 
 
-def triangles(body, alive, owner, direction):
-    """M8.4, M8.6: triples of vertices."""
-    vertex = {key: k for k, key in enumerate(zip(owner.tolist(), direction.tolist()))}
+def triangles(body, alive, keys):
+    """M8.4, M8.6: triples of vertices, which are pairs (owner, direction)."""
+    vertex = {key: k for k, key in enumerate(keys)}
     inside = np.zeros(body.nodes, int)
     inside[tuple(body.place.T)] = alive
     corners = [np.array([c & 1, c >> 1 & 1, c >> 2 & 1]) for c in range(8)]

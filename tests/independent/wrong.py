@@ -3,6 +3,7 @@
 WRONG = [
     ("M1.1", "shapes", "np.hypot(r - radius, along) - tube", "np.hypot(r - radius, along) - 1.02 * tube"),
     ("M1.1 difference", "shapes", "[-f(p) for f in functions[1:]]", "[f(p) for f in functions[1:0]]"),
+    ("M1.1 surface", "on_surfaces", "(candidates + 0.5)) < 0]", "(candidates + 0.5)) <= 0]"),
     ("M1.2 kidney", "sampled", "dent = 1.1 *", "dent = 1.2 *"),
     ("M1.2 liver", "arc", "ay, az = 1 - 0.5 * w, 1 - 0.8 * w", "ay, az = 1 - 0.5 * w, 1 - 0.7 * w"),
     ("M1.7", "wedge", "np.sign(third_moment)", "-np.sign(third_moment)"),
