@@ -10,6 +10,7 @@ exists, and that all of them together have 2 MB at most. Exit status: 0 yes, 1 n
 """
 import argparse
 import json
+import math
 import pathlib
 import re
 import shutil
@@ -78,6 +79,14 @@ def table(head, rows):
 
 # --- README.md -------------------------------------------------------------------------------------------------------
 
+def inconclusive(campaign):
+    """How many comparisons of the step again rounding left open, of what it checked."""
+    for one in campaign["properties"]:
+        if one["property"] == "admissible step" and one.get("inconclusive"):
+            return f"; {percent(one['inconclusive'], one['checked'])} of *admissible step* inconclusive"
+    return ""
+
+
 def status(read):
     rows = []
     for name, where in (("h200_fuzz_million", "H200"), ("h200_fuzz_dynamics", "H200"), ("cpu_fuzz_host", "2 CPU cores"),
@@ -88,7 +97,7 @@ def status(read):
                      f"`cutproof fuzz --backend {one['backend']}{' --devices all' if len(devices) > 1 else ''}"
                      f"{' --dynamics' if one['dynamics'] else ''} --cases {one['cases_asked']} --seed {one['seed']}`",
                      where if len(devices) == 1 else f"{len(devices)} {where}",
-                     f"{len(one['violations'])} violations in {one['verdicts']:,} verdicts"
+                     f"{len(one['violations'])} violations in {one['verdicts']:,} verdicts" + inconclusive(one)
                      + (f"; {one['seconds']:.0f} s" if one["backend"] == "gpu" else "")])  # cores had other work too
     kit = read("h200_kit_summary")
     steps = kit["steps"]
@@ -187,31 +196,42 @@ def without_tears(read, remove):
 def errors(read):
     random_steps = read("h200_fuzz_dynamics")["steps_compared"]
     lockstep = read("cpu_lockstep_host")["scenes"]
-    solved = read("h200_solver_every_frame")["scenes"]
     given = [one["as_given"]["rms_h"] for one in read("h200_fronts")["fronts"] if not one["retardation"]]
     nearer = without_tears(read, "nearer")
     limits = {scene: levels_of(read(f"cpu_tune_limit_{scene}")) for scene in CUT_SCENES}
     last = [levels[-1]["apart_h"] for levels in limits.values()]
     known = [known_to(read(f"cpu_tune_retarded_{scene}")) for scene in CUT_SCENES]
     known = [value for value in known if value is not None]
-    total = random_steps["particles"] + random_steps["not_compared"]
     return table(["error", "size", "depends on"], [
         ["implementation: single precision beside the double-precision reference, one frame",
          f"scenes: at most {figure(max(one['greatest']['position']['max'] for one in lockstep))} h; random cases: at most "
-         f"{figure(random_steps['greatest_h'])} h in {random_steps['steps']:,} steps, without "
-         f"{percent(random_steps['not_compared'], total)} of positions, which rounding can carry farther",
+         f"{figure(random_steps['greatest_h'])} h in {random_steps['steps']:,} steps",
          "stiffness, contacts"],
         ["solver: as given beside the same substeps solved",
-         f"a substep: {figure(max(one['rms_h'] for one in solved))} h RMS at most, "
-         f"{figure(max(one['max_h'] for one in solved))} h at worst; a scene: {figure(min(given))}–{figure(max(given))} h RMS",
-         "k dt², iterations"],
+         f"scenes: {figure(min(given))}–{figure(max(given))} h RMS", "k dt², iterations"],
         ["geometry: skin beside the blade's path, nearer end removed",
          f"{span([run['skin_rms'] for run in nearer])} h RMS; {span([ratio(run) for run in nearer])} times the least loss of "
          "tissue", "grid"],
         ["time step",
          f"without retardation {span(last)} h between the last two levels; with it the limit is known to "
          f"{figure(min(known))}–{figure(max(known))} h in {len(known)} of {len(CUT_SCENES)} cut scenes", "dt, damping"],
-        ["model: another cluster size is another material", "no error of the program", "cluster size"]])
+        ["model: another cluster size is another material", "not measured", "cluster size"]])
+
+
+def single_steps(read):
+    """Of each scene: a frame in single beside double precision, and a substep beside its solution."""
+    solved = {one["scene"]: one for one in read("h200_solver_every_frame")["scenes"]}
+    rows = []
+    for one in read("cpu_lockstep_host")["scenes"]:
+        of = solved.get(one["scene"], {})
+        left = one["positions_not_compared"]
+        rows.append([one["scene"], figure(one["greatest"]["position"]["max"]),
+                     percent(left, one["particles"] * one["frames"]) if left else "0",
+                     figure(of.get("rms_h")), figure(of.get("max_h"))])
+    steps = read("h200_fuzz_dynamics")["steps_compared"]
+    rows.append(["random cases", figure(steps["greatest_h"]),
+                 percent(steps["not_compared"], steps["particles"] + steps["not_compared"]), "–", "–"])
+    return table(["scene", "implementation, greatest", "not compared", "solver, RMS", "greatest"], rows)
 
 
 def ratio(run):
@@ -265,10 +285,11 @@ def retardation(read):
         if scene in CUT_SCENES:
             plain = {level["substeps"]: level["apart_h"] for level in levels_of(read(f"cpu_tune_limit_{scene}"))}
         known = known_to(damped)
-        rows.append([scene, *(figure(plain.get(level)) for level in (64, 128)),
+        order = math.log2(apart[256] / apart[512]) if 512 in apart else None
+        rows.append([scene, *(figure(plain.get(level)) for level in (64, 128, 256, 512)),
                      *(figure(apart.get(level)) for level in (64, 128, 256, 512)),
-                     "not known" if known is None else figure(known)])
-    return table(["scene", "64", "128", "retarded: 64", "128", "256", "512", "limit known to"], rows)
+                     "–" if order is None else f"{order:.2f}", "not known" if known is None else figure(known)])
+    return table(["scene", "64", "128", "256", "512", "retarded: 64", "128", "256", "512", "order", "limit known to"], rows)
 
 
 FRONT_SCENES = ("small_block", "kidney_arc", "three_cuts", "cuboid_press", "liver_cut", "irregular_sampled", "kidney_101096")
@@ -430,7 +451,7 @@ def mutants_alone(read):
     return table(["stage", *alone["columns"], "any"], rows)
 
 
-TABLES = {of.__name__: of for of in (status, table_1, fig_10, sizes, errors, solver, rotations, retardation, front, cut_faces,
+TABLES = {of.__name__: of for of in (status, table_1, fig_10, sizes, errors, single_steps, solver, rotations, retardation, front, cut_faces,
                                      geometry, baselines, sensitivity, claims, isolation, cuda_plugins, mutants_by_finder,
                                      mutants_alone)}
 # Documents that only pictures are made of: docs/images/make.
