@@ -172,13 +172,13 @@ void describe(auto& v, StepParameters& s) {
                      "paper's Jacobi PBD (method.md §3)."});
   v.field(s.substeps, {"substeps", "Substeps per frame.", between(1, 100000)});
   v.field(s.iterations, {"iterations", "K, solver iterations per substep.", between(0, 1e6)});
-  v.field(s.stiffness, {"stiffness", "k, stiffness per mass; `implicit` only, with s = k dt² / (1 + k dt²).",
+  v.field(s.stiffness, {"stiffness", "k, stiffness per mass; `implicit` only, with κ = k dt (dt + τ) and s = κ / (1 + κ).",
                         between(0, 1e15, "1/s²")});
   v.field(s.relaxation, {"relaxation", "s; `published` only.", above(0, 1)});
   v.field(s.acceleration, {"acceleration",
                            "`chebyshev`: the same answer in fewer, slightly dearer iterations; the energy may rise in "
                            "some (method.md §11). `published` has only `none`, there the default."});
-  v.field(s.damping, {"damping", "c: velocities decay as exp(−c t).", between(0, 1e9, "1/s")});
+  v.field(s.damping, {"damping", "γ: velocities decay as exp(−γ t).", between(0, 1e9, "1/s")});
   v.field(s.retardation, {"retardation",
                           "τ, delay of elasticity, which acts on x + τ v: Rayleigh damping, a Kelvin–Voigt material of "
                           "viscosity τ times its elastic modulus. Deformations fade, rigid motion does not, and the "
