@@ -120,6 +120,12 @@ SCENES = {
     "sampled_uncovered": {
         "seed": 5, "body": block(9, 5, 4), "clusters": {"method": "sampled", "spacing": 2, "radius": 2, "small": 1, "cap": 2}, "frame": {"count": 8},
         "expand": {"rule": "published", "depth": 3}, "detect": {"criterion": "geometric"}, "blade": {"length": 0.4, "speed": 0.8, "strokes": ZIGZAG}},
+    # a cluster that is isolated by a cut; unions of exactly `cap` particles
+    "isolated": {
+        "seed": 12, "body": block(8, 4, 3), "clusters": {"method": "sampled", "spacing": 1.5, "radius": 1.5}, "frame": {"count": 8},
+        "merge": {"rule": "none"}, "expand": {"rule": "published", "depth": 2}, "detect": {"criterion": "geometric"},
+        "blade": {"length": 0.4, "speed": 0.8, "strokes": ZIGZAG}},
+    "filled": {"body": block(9, 5, 4), "clusters": {"side": 2, "small": 1.0, "cap": 1.2}, "frame": {"count": 1}},
     # arcs: with contacts, turning fast, tilted, and geometric
     "arc": {
         "body": {"shape": {"kind": "liver", "size": [0.11, 0.07, 0.06]}, "spacing": 0.0088}, "clusters": {"side": 3}, "frame": {"settle": 0.03},
@@ -223,4 +229,4 @@ for scene in SCENES.values():
     scene["version"] = 5
 
 SHORT = ("wedge", "long_prism", "friction", "frictionless", "mixed_walls", "retardation", "grips_alone", "grips_after_strokes", "sampled", "sampled_deep",
-         "sampled_published", "arc_fast", "arc_geometric", "corners", "strain", "tilted", "debris", "shapes", "alpha", "slanted_skin", "fork", "on_surfaces", "diagonal", "begun_inside", "fallen", "rods")
+         "sampled_published", "arc_fast", "arc_geometric", "corners", "strain", "tilted", "debris", "shapes", "alpha", "slanted_skin", "fork", "on_surfaces", "isolated", "diagonal", "begun_inside", "fallen", "rods")
