@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
-# A subcommand of cutproof in continuous integration: leaves results.json, junit.xml and page.html in a folder, and ends as
-# the program does (0: everything holds, 1: something fails, 2: bad input, 3: the machine failed).
+# A subcommand of cutproof in continuous integration: leaves results.json, junit.xml, page.html and, of fuzz and judge, the
+# counterexamples (cases/, unless --save names a folder) in a folder. Ends as the program does (0: everything holds, 1:
+# something fails, 2: bad input, 3: the machine failed).
 # Usage: judge.sh PACKAGE FOLDER SUBCOMMAND ARGUMENTS...     e.g. judge.sh cutproof-0.1.0-linux-x86_64.tar.gz found check RUN
 #   PACKAGE     the .tar.gz of ci/package.sh, which is unpacked into FOLDER/program unless it is there; "-": the program
 #               that is installed
-#   SUBCOMMAND  run, check, judge or fuzz, which write all three
+#   SUBCOMMAND  run, check, judge or fuzz, which write all three; others have --json and --junit themselves
 set -euo pipefail
 
 refuse() { echo "judge.sh: $1" >&2; exit 2; }
@@ -29,4 +30,12 @@ if [ "$package" != - ]; then
 fi
 command -v "$program" >/dev/null || refuse "the program cutproof is not in PATH: install it, or name a package instead of -"
 mkdir -p "$folder"
-exec "$program" "$@" --json "$folder/results.json" --junit "$folder/junit.xml" --report "$folder/page.html"
+save=()
+case "$* " in
+  *" --save"[\ =]* | *" --merge"[\ =]* | *" --case"[\ =]*) ;;
+  judge\ * | fuzz\ *)
+    mkdir -p "$folder/cases"
+    save=(--save "$folder/cases")
+    ;;
+esac
+exec "$program" "$@" "${save[@]}" --json "$folder/results.json" --junit "$folder/junit.xml" --report "$folder/page.html"

@@ -88,7 +88,8 @@ def judge_examples(archive, options):
         folder = options.work / system
         (folder / "ci").mkdir(parents=True)
         shutil.copy(options.source / "ci/judge.sh", folder / "ci")
-        for arguments, status in (("run small_block --check topology", 0), ("run small_block --frames -1", 2)):
+        for arguments, status in (("run small_block --check topology", 0), ("fuzz --backend host --cases 20", 0),
+                                  ("run small_block --frames -1", 2)):
             surroundings = {"PATH": "/usr/bin:/bin", "HOME": str(folder), "CUTPROOF_PACKAGE": str(archive),
                             "GITHUB_ACTION_PATH": str(options.source), "PACKAGE": str(archive), "FOLDER": "found",
                             "ARGUMENTS": arguments}
@@ -97,7 +98,8 @@ def judge_examples(archive, options):
             done = run(["bash", "-e", "-c", line], cwd=folder, env=surroundings)
             expect(done.returncode == status, f"{system}: {line} ended with {done.returncode}: {done.stdout}")
             left = {path.name for path in (folder / "found").iterdir()} - {"program"}
-            expect(left == ({"results.json", "junit.xml", "page.html"} if status == 0 else set()),
+            written = {"results.json", "junit.xml", "page.html"} | ({"cases"} if "fuzz" in arguments else set())
+            expect(left == (written if status == 0 else set()),
                    f"{system}: {line} leaves {left}")
     script = options.source / "ci/judge.sh"
     for command, word in (([script, options.work / "none", options.work / "found", "run"], "no package"),
