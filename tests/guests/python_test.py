@@ -554,6 +554,26 @@ class Program(Test):
         self.assertEqual((len(os.listdir("/proc/self/fd")), threading.active_count()), before)
 
 
+class Relations(Test):
+    def simulated(self, scene, gravity=None):
+        x, v, places = scene["rest"], scene["velocities"], []
+        for _ in range(10):
+            places.append(x)
+            v = v + scene["dt"] * ((scene["gravity"] if gravity is None else gravity) - scene["drag"] * v)
+            x = x + scene["dt"] * v
+        given = {name: scene[name] for name in ("rest", "mass", "gravity")}
+        return dict(given, positions=numpy.array(places), time=numpy.arange(10) * scene["dt"])
+
+    def test_a_mapped_scene_gives_the_mapped_run_unless_a_constant_has_a_dimension(self):
+        scene = dict(rest=numpy.eye(3), velocities=numpy.ones((3, 3)), mass=numpy.ones(3),
+                     gravity=numpy.array([0, 0, -9.81]), drag=numpy.array(0.5), dt=numpy.array(0.01))
+        scaled = cutproof.mapped("units:4,4,16", scene, drag=(0, -1, 0), dt=(0, 1, 0))
+        cutproof.relate(self.simulated(scene), self.simulated(scaled), map="units:4,4,16")
+        with self.assertRaises(cutproof.Failed):
+            fixed = scene["gravity"]
+            cutproof.relate(self.simulated(scene, fixed), self.simulated(scaled, fixed), map="units:4,4,16")
+
+
 class Documentation(Test):
     def test_the_examples_run(self):
         page = (ROOT / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
