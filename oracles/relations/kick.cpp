@@ -380,9 +380,11 @@ std::string likely_cause(const KickedRuns& runs, const KickAnswer& answer) {
   }
   if (!std::isfinite(share)) return "";
   if (share > kOfASolver || 2 * felt <= others) return fmt::format("; by {:.2g} of the kick at most", share);
-  return fmt::format("; global coupling, {:.2g} of the kick, as by a solver or a time step that all pieces share: ",
-                     share) +
-         (runs.tolerance > 0 ? fmt::format("tolerance is {:g}", runs.tolerance) : "if it is meant, state a tolerance");
+  return fmt::format(
+             ". It is global coupling, {:.2g} of the kick, as by a solver or a time step that all pieces share. ",
+             share) +
+         (runs.tolerance > 0 ? fmt::format("The declared tolerance is {:g}", runs.tolerance)
+                             : "If it is meant, declare a tolerance");
 }
 
 Verdict others_feel_nothing(const Differences& differences, const std::vector<double>& bounds, bool repeats,
@@ -417,10 +419,8 @@ Verdict others_feel_nothing(const Differences& differences, const std::vector<do
       verdict.witness.particles = {farthest.particle};
       const std::string by = std::isfinite(farthest.distance) ? "by " + in_spacings(runs, farthest.distance)
                                                               : "which is there in one of the runs alone";
-      verdict.witness.text = fmt::format(
-          "particle {} of piece {} felt it first, from frame {} on, {}, because piece {} was kicked{}, to which it is "
-          "not connected",
-          farthest.particle, piece, f, by, kicked, differences.which);
+      verdict.witness.text =
+          fmt::format("Particle {} of piece {} felt it first, from frame {} on, {}", farthest.particle, piece, f, by);
     } else if (const double of_bound = farthest.distance > 0 ? farthest.distance / bound : 0;
                verdict.holds && of_bound > share) {
       share = of_bound;
@@ -429,12 +429,16 @@ Verdict others_feel_nothing(const Differences& differences, const std::vector<do
       verdict.bound = bound;
     }
   }
-  for (const KickedPiece& piece : answer.pieces) {
-    if (piece.piece == kicked || piece.felt == 0) continue;
-    verdict.witness.text +=
-        fmt::format("; {} of {} particles of piece {} did", piece.felt, piece.particles, piece.piece);
+  if (!verdict.holds) {
+    std::vector<std::string> felt;
+    for (const KickedPiece& piece : answer.pieces) {
+      if (piece.piece != kicked && piece.felt > 0)
+        felt.push_back(fmt::format("{} of {} particles of piece {}", piece.felt, piece.particles, piece.piece));
+    }
+    verdict.witness.text = fmt::format("{} move because piece {} was kicked{}, to which they are not connected. ",
+                                       fmt::join(felt, ", "), kicked, differences.which) +
+                           verdict.witness.text + likely_cause(runs, answer);
   }
-  if (!verdict.holds) verdict.witness.text += likely_cause(runs, answer);
   if (verdict.checked == 0) verdict.vacuous = "there is no other piece, or nothing of one exists";
   return verdict;
 }
@@ -494,13 +498,12 @@ Verdict answers_are_equal(const KickedRuns& runs, const std::map<std::size_t, Ce
     verdict.bound = within;
     if (holds) continue;
     const auto who = [&](std::size_t k) {
-      return fmt::format("the centre of piece {} by {:.4g} m (kick {})", *report.kicks[k].kicked_piece, way(k), k);
+      return fmt::format("kick {} moves the centre of piece {} by {:.4g} m", k, *report.kicks[k].kicked_piece, way(k));
     };
-    verdict.witness.text = fmt::format(
-        "kicks that are stated to be equal are answered otherwise: in frame {} {}, and {}", f, who(most), who(least));
-    if (measured < kOfASolver) {
-      verdict.witness.text += "; if many substeps or a solver explain so little, state steps or a tolerance";
-    }
+    verdict.witness.text =
+        fmt::format("the answers to kicks that are stated to be equal differ by {:.3g} %: in frame {} {}, and {}",
+                    100 * measured, f, who(most), who(least));
+    if (measured < kOfASolver) verdict.witness.text += ". If so small a difference is expected, declare a tolerance";
   }
   if (verdict.checked == 0) {
     verdict.holds = false;
@@ -516,6 +519,7 @@ Verdict answers_are_equal(const KickedRuns& runs, const std::map<std::size_t, Ce
 std::vector<Verdict> KickReport::all() const {
   std::vector<Verdict> all = verdicts;
   for (const KickAnswer& kick : kicks) all.insert(all.end(), kick.verdicts.begin(), kick.verdicts.end());
+  std::stable_partition(all.begin(), all.end(), [](const Verdict& one) { return one.property != "equal answers"; });
   return all;
 }
 

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "model/at.h"
+#include "model/counted.h"
 #include "oracles/rounding.h"
 #include "oracles/runs/cells.h"
 #include "oracles/runs/pieces.h"
@@ -44,6 +45,14 @@ constexpr double kBetween = 4;
 
 // One whose square is none is beyond all bounds.
 bool is_number(Vec3 x) { return std::isfinite(dot(x, x)); }
+
+// Of a vector of length `was` that is `is` long now, and is off by `off` from what it was.
+std::string change_in_words(double was, double is, double off) {
+  if (!(was > 0)) return "angular momentum appears";
+  const double lost = was - is;
+  if (lost > 0.5 * off) return fmt::format("{:.3g} % of the angular momentum is lost", 100 * lost / was);
+  return fmt::format("angular momentum changes by {:.3g} %", 100 * off / was);
+}
 
 // A sum of many. In double precision each addition of equal numbers may round the same way, by more in all than bounds
 // allow.
@@ -158,7 +167,13 @@ class RunJudge::Implementation {
     energy(frame);
     cells(frame);
     cut(frame);
-    if (is_coupled_ && tissue_ && (is_new_coupling_ || !frame.blade.empty() || is_new_gone_)) partitions();
+    if (is_coupled_ && tissue_) {
+      if (is_new_coupling_ || !frame.blade.empty() || is_new_gone_) {
+        partitions();
+      } else {
+        for (const Which which : {kAcross, kWithin}) count_frame(found_[which], found_[which].last_holds);
+      }
+    }
     if (!frame.piece.empty()) said(frame);
     is_new_coupling_ = is_new_gone_ = is_new_mass_ = false;
     was_.assign(frame.positions.begin(), frame.positions.end());
@@ -179,9 +194,10 @@ class RunJudge::Implementation {
       const bool is_cut = tissue_->surely_cut() > 0 || tissue_->apart().count > pieces_at_first_;
       verdict.measured = is_cut ? 0 : 1;
       if (!is_cut)
-        fail(kSomethingCut, {}, "the blade has surely cut no edge of the tissue, and perhaps {}: nothing was tested",
+        fail(kSomethingCut, {}, "the blade cuts no edge of the tissue, and touches {}: nothing was tested",
              tissue_->perhaps_cut());
     }
+    for (std::size_t k = 0; k < kProperties; ++k) tell_frames(static_cast<Which>(k));
     if (!found_[kAngular].verdict.checked && lost_ > 0) {
       notes_.push_back(
           fmt::format("The run loses up to {:.2g} of its angular momentum in a frame (frame {}). A scheme "
@@ -252,8 +268,10 @@ class RunJudge::Implementation {
  private:
   struct Found {
     Verdict verdict;
-    double nearest = -1;  // measured / bound
-    std::string why;      // it was not asked
+    double nearest = -1;                         // measured / bound
+    std::string why;                             // it was not asked
+    int64_t frames = 0, failing = 0, last = -1;  // frames in which it was judged, and fails; the last of them
+    bool last_holds = true;
   };
 
   static Verdict fresh(Which which) {
@@ -273,13 +291,35 @@ class RunJudge::Implementation {
     verdict.frame = frame_;
     verdict.witness = witness_of<Args...>(std::move(concerned), text, std::forward<Args>(args)...);
   }
+  void count_frame(Found& found, bool holds) {
+    const bool is_new = found.last != frame_, had_failed = !is_new && !found.last_holds;
+    found.frames += is_new;
+    found.failing += !holds && !had_failed;
+    found.last_holds = holds && !had_failed;
+    found.last = frame_;
+  }
+  // Of a failure: in how many frames.
+  void tell_frames(Which which) {
+    Found& found = found_[which];
+    if (found.verdict.holds || found.frames == 0) return;
+    std::string& text = found.verdict.witness.text;
+    if (which == kFinite) {
+      text += ". Later frames are not judged";
+    } else if (found.failing == 1) {
+      text += fmt::format(". It fails in this frame alone, of {} judged", found.frames);
+    } else {
+      text += fmt::format(". It fails in {} of {} judged frames, first in frame {}", found.failing, found.frames,
+                          found.verdict.frame);
+    }
+  }
   // Whether a comparison is within its bound; the first that is not is kept, or else that which comes nearest.
   bool within(Which which, double measured, double bound) {
     Found& found = found_[which];
     ++found.verdict.checked;
+    const bool is_within = measured <= bound && std::isfinite(bound);
+    count_frame(found, is_within);
     const bool is_first_failure = !found.verdict.holds && found.verdict.frame == frame_ && std::isfinite(found.nearest);
     if (!found.verdict.holds && !is_first_failure) return true;
-    const bool is_within = measured <= bound && std::isfinite(bound);
     const double ratio = is_within ? (bound > 0 ? measured / bound : 0) : std::numeric_limits<double>::infinity();
     if (ratio > found.nearest) {
       found.nearest = ratio;
@@ -329,16 +369,19 @@ class RunJudge::Implementation {
     for (std::size_t i = 0; i < exists_.size(); ++i) exists_[i] = exists(frame, i);
     ever_.resize(exists_.size());
     int64_t revived = 0;
+    int32_t first = -1;
     for (std::size_t i = 0; i < exists_.size(); ++i) {
       const bool existed = i < existed_.size() && existed_[i] != 0;
       if (exists_[i] != 0 && !existed && ever_[i] != 0) {
-        ++revived;
-        fail(kGone, {{}, {static_cast<int32_t>(i)}}, "particle {} was gone, and is there again in frame {}", i, frame_);
+        if (++revived == 1) first = static_cast<int32_t>(i);
       }
       if (exists_[i] == 0 && existed) is_new_gone_ = true;
       ever_[i] |= exists_[i];
     }
-    if (frames_ > 1) within(kGone, static_cast<double>(revived), 0);
+    if (frames_ > 1 && !within(kGone, static_cast<double>(revived), 0))
+      fail(kGone, {{}, {first}}, "{} that {} gone {} there again in frame {}, for example {}",
+           counted(revived, "particle", "particles"), revived == 1 ? "was" : "were", revived == 1 ? "is" : "are",
+           frame_, first);
   }
 
   void check_finite(const RunFrame& frame) {
@@ -512,8 +555,10 @@ class RunJudge::Implementation {
         decay * decay * norm(p_was) + (decay + decay * decay) * (norm(impulse) + mass * norm(gravity) * dt);
     const double off = norm(p - expected);
     if (!within(kMomentum, off, rounding + slack + adding + 4 * header_.u * pushed))
-      fail(kMomentum, {}, "momentum changes by {:.3g} kg m/s in frame {} more than gravity and contacts explain", off,
-           frame_);
+      fail(kMomentum, {},
+           "momentum changes by {:.3g} kg m/s in frame {} more than gravity and contacts explain: the whole body gains "
+           "{:.3g} m/s",
+           off, frame_, off / mass);
     if (norm(impulse) == 0 && !is_held && (is_free || frame.blade.empty())) {
       // The mean velocity of the frame lies between those of its ends; half a substep of gravity either way.
       const Vec3 middle = 0.5 * (p + p_was);
@@ -546,8 +591,10 @@ class RunJudge::Implementation {
       const double decay = header_.damping * *frame.time - header_.damping * *time_was_;
       if (!within(kAngular, off,
                   2 * farthest * rounding + kDeviations * header_.u * size + 2 * decay * norm(spins_was)))
-        fail(kAngular, {}, "angular momentum changes from {:.4g} to {:.4g} kg m²/s in frame {}, where nothing pushes",
-             norm(spins_was), norm(spins), frame_);
+        fail(kAngular, {},
+             "{} in frame {}, although no outside force acts: from {:.4g} to {:.4g} kg m²/s; the vector changes by "
+             "{:.4g} kg m²/s",
+             change_in_words(norm(spins_was), norm(spins), off), frame_, norm(spins_was), norm(spins), off);
     } else if (norm(spins_was) > 1e3 * (2 * farthest * rounding) && off / norm(spins_was) > lost_) {
       lost_ = off / norm(spins_was);
       lost_at_ = frame_;
@@ -577,8 +624,9 @@ class RunJudge::Implementation {
       const double bound = kDeviations * header_.u * std::sqrt(static_cast<double>(header_.steps * n_)) *
                            (std::abs(*energy_was_) + std::abs(*frame.energy));
       if (!within(kEnergy, std::max(0.0, grown), bound))
-        fail(kEnergy, {}, "energy grows from {:.6g} to {:.6g} J in frame {}, where nothing pushes", *energy_was_,
-             *frame.energy, frame_);
+        fail(kEnergy, {},
+             "energy grows by {:.3g} J in frame {}, although no outside force acts: from {:.6g} to {:.6g} J", grown,
+             frame_, *energy_was_, *frame.energy);
     }
     energy_was_ = frame.energy;
   }
@@ -587,6 +635,7 @@ class RunJudge::Implementation {
     const int corners = coupling_.corners;
     if (corners == 0) return;
     const std::size_t count = coupling_.cells.size() / at(corners);
+    std::size_t first = 0;
     int64_t inverted = 0;
     double volume = 0;
     Vec3 x[8], rest[8];
@@ -604,11 +653,14 @@ class RunJudge::Implementation {
       if (!exists) continue;
       if (has_rest) volume += size_of(rest, corners);
       if (!is_inverted(x, corners)) continue;
-      ++inverted;
-      const int32_t first = coupling_.cells[cell * at(corners)];
-      fail(kInverted, {{}, {first}}, "cell {} at particle {} is inverted in frame {}", cell, first, frame_);
+      if (++inverted == 1) first = cell;
     }
-    within(kInverted, static_cast<double>(inverted), 0);
+    if (!within(kInverted, static_cast<double>(inverted), 0)) {
+      const auto begin = coupling_.cells.begin() + static_cast<std::ptrdiff_t>(first * at(corners));
+      fail(kInverted, {{}, {begin, begin + corners}},
+           "{} of {} cells {} inverted in frame {}, for example cell {} at particle {}", inverted, count,
+           inverted == 1 ? "is" : "are", frame_, first, *begin);
+    }
     if (!weighs) return;
     if (!volume_at_rest_) volume_at_rest_ = volume;
     if (*volume_at_rest_ == 0) return;
@@ -709,6 +761,7 @@ class RunJudge::Implementation {
     const SweptTissue::Pieces apart = tissue_->apart();
     std::map<int32_t, int32_t> piece_of, unit_of;  // of a component of the coupling: the piece of a unit in it
     int64_t across = 0;
+    std::array<int32_t, 2> example = {-1, -1};
     for (int32_t unit = 0; unit < units_; ++unit) {
       const int32_t piece = apart.label[at(unit)];
       if (piece < 0 || tissue_->is_beside(unit)) continue;
@@ -717,15 +770,19 @@ class RunJudge::Implementation {
       if (is_new) {
         unit_of[component] = unit;
       } else if (known->second != piece && ++across == 1) {
-        if (const auto [a, b] = parted_in_a_group(apart); a >= 0)
-          fail(kAcross, {{}, {a, b}}, "particles {} and {} are coupled by one group in frame {}, and {}", a, b, frame_,
-               has_blade_ ? "the blade has parted them" : "no tissue joins them");
-        fail(kAcross, {{}, {unit_particle(unit_of[component]), unit_particle(unit)}},
-             "particles {} and {} are coupled in frame {}, and {}", unit_particle(unit_of[component]),
-             unit_particle(unit), frame_, has_blade_ ? "the blade has parted them" : "no tissue joins them");
+        example = {unit_particle(unit_of[component]), unit_particle(unit)};
       }
     }
-    within(kAcross, static_cast<double>(across), 0);
+    const char *const one = by_cells() ? "cell" : "particle", *const several = by_cells() ? "cells" : "particles";
+    if (!within(kAcross, static_cast<double>(across), 0)) {
+      const std::array<int32_t, 2> direct = parted_in_a_group(apart);
+      const auto [a, b] = direct[0] >= 0 ? direct : example;
+      fail(kAcross, {{}, {a, b}},
+           "{} of {} {} coupled to another piece in frame {}. For example, {} couples particles {} and {}, which {}",
+           across, counted(units_, one, several), across == 1 ? "is" : "are", frame_,
+           direct[0] >= 0 ? "one group" : "a chain of groups", a, b,
+           has_blade_ ? "the blade has parted" : "no tissue joins");
+    }
     const SweptTissue::Pieces together = tissue_->together();
     std::vector<int32_t> component_of(at(together.count), -1), first(at(together.count), -1);
     int64_t torn = 0;
@@ -737,13 +794,14 @@ class RunJudge::Implementation {
         first[at(piece)] = unit;
         component_of[at(piece)] = component;
       } else if (component_of[at(piece)] != component) {
-        ++torn;
-        fail(kWithin, {{}, {unit_particle(first[at(piece)]), unit_particle(unit)}},
-             "particles {} and {} are no longer coupled in frame {}, and no blade has been between them",
-             unit_particle(first[at(piece)]), unit_particle(unit), frame_);
+        if (++torn == 1) example = {unit_particle(first[at(piece)]), unit_particle(unit)};
       }
     }
-    within(kWithin, static_cast<double>(torn), 0);
+    if (!within(kWithin, static_cast<double>(torn), 0))
+      fail(kWithin, {{}, {example[0], example[1]}},
+           "{} of {} {} no longer coupled to the rest of the piece in frame {}, for example {} to {}; no blade has "
+           "been between them",
+           torn, counted(units_, one, several), torn == 1 ? "is" : "are", frame_, example[1], example[0]);
   }
 
   // What the simulator says is a piece lies in one piece, and joins what nothing has cut.
@@ -753,25 +811,33 @@ class RunJudge::Implementation {
     std::map<int32_t, int32_t> seen;
     std::vector<std::optional<int32_t>> word(at(together.count));
     int64_t wrong = 0;
+    int32_t example = -1;
+    std::string why;
     for (int32_t unit = 0; unit < units_; ++unit) {
       if (apart.label[at(unit)] < 0) continue;
       const int32_t particle = unit_particle(unit), name = frame.piece[at(particle)];
       if (!tissue_->is_beside(unit)) {
         const auto [known, is_new] = seen.emplace(name, apart.label[at(unit)]);
         if (!is_new && known->second != apart.label[at(unit)]) {
-          ++wrong;
-          fail(kSaid, {{}, {particle}}, "piece {} has particles on both sides of a cut, such as {}", name, particle);
+          if (++wrong == 1) {
+            example = particle;
+            why = fmt::format("piece {} has particles on both sides of a cut, such as {}", name, particle);
+          }
         }
       }
       std::optional<int32_t>& one = word[at(together.label[at(unit)])];
       if (!one) one = name;
       if (*one != name) {
-        ++wrong;
-        fail(kSaid, {{}, {particle}}, "particle {} is in piece {}, and is joined to piece {} by whole tissue", particle,
-             name, *one);
+        if (++wrong == 1) {
+          example = particle;
+          why = fmt::format("particle {} is in piece {}, and is joined to piece {} by whole tissue", particle, name,
+                            *one);
+        }
       }
     }
-    within(kSaid, static_cast<double>(wrong), 0);
+    if (!within(kSaid, static_cast<double>(wrong), 0))
+      fail(kSaid, {{}, {example}}, "piece numbers contradict the cut {} in frame {}. For example, {}",
+           counted(wrong, "time", "times"), frame_, why);
   }
 
   const RunHeader header_;

@@ -177,6 +177,10 @@ class RunRelation::Implementation {
     } else {
       notes_.push_back(first_other_ ? other_in_words() : "Both runs have the same bits.");
     }
+    for (Found& found : found_) {
+      if (found.verdict.holds || found.frames == 0) continue;
+      found.verdict.witness.text += fmt::format(". It fails in {} of {} compared frames", found.failing, found.frames);
+    }
     if (lost_ >= 0) {
       notes_.push_back(
           fmt::format("Lost in chaos from frame {} on: right runs may be farther apart there than any "
@@ -208,6 +212,7 @@ class RunRelation::Implementation {
     Verdict verdict;
     double nearest = -1;  // measured / bound
     double noise = 0;     // the greatest so far, in the units of A
+    int64_t frames = 0, failing = 0;
   };
   struct Other {
     int64_t frame = 0;
@@ -316,8 +321,9 @@ class RunRelation::Implementation {
         may_branch_ = true;
       } else if (in_first != in_second && !may_branch_) {
         ++verdict.measured;
-        fail(kExistence, {{}, {static_cast<int32_t>(i)}}, "particle {} exists in the {} run alone in frame {}{}", i,
-             in_first ? "first" : "second", frame_,
+        fail(kExistence, {{}, {static_cast<int32_t>(i)}},
+             "the runs decide differently first in frame {}: particle {} exists in the {} run alone{}", frame_, i,
+             in_first ? "first" : "second",
              noise_runs_ > 0 ? "; a branch that no disturbed run took is possible: disturb more" : "");
       }
     }
@@ -341,9 +347,12 @@ class RunRelation::Implementation {
     return noise_runs_ > 0 ? kNoiseFactor * found.noise + by_map : rounds(which) + by_map;
   }
 
-  void note(Which which, double measured, double bound, int32_t particle) {
+  // `off`: of each particle; empty of a total.
+  void note(Which which, double measured, double bound, int32_t particle, const std::vector<double>& off = {}) {
     Found& found = found_[which];
     ++found.verdict.checked;
+    ++found.frames;
+    found.failing += !(measured <= bound);
     if (!found.verdict.holds) return;
     const double ratio = measured == 0 ? 0 : measured / bound;
     if (ratio > found.nearest || !(measured <= bound)) {
@@ -353,16 +362,19 @@ class RunRelation::Implementation {
       found.verdict.frame = frame_;
     }
     if (measured <= bound) return;
-    const char* const why = noise_runs_ > 0 ? "64 times the noise of the disturbed runs"
-                                            : "what rounds, unless the motion makes more of it "
-                                              "(--noise says by how much)";
+    const std::string explained =
+        noise_runs_ > 0
+            ? fmt::format("64 times the noise of the disturbed runs explains {:.4g} {}", bound, kNames[which].unit)
+            : fmt::format(
+                  "Rounding alone explains {:.4g} {}. If contacts amplify rounding, rerun with "
+                  "--noise",
+                  bound, kNames[which].unit);
     if (particle >= 0) {
-      fail(which, {{}, {particle}},
-           "particle {} is off by {:.4g} {} in frame {}; right runs are by at most {:.4g} {}: {}", particle, measured,
-           kNames[which].unit, frame_, bound, kNames[which].unit, why);
+      const auto beyond = std::count_if(off.begin(), off.end(), [&](double one) { return !(one <= bound); });
+      fail(which, {{}, {particle}}, "{} of {} particles {} off in frame {}, particle {} by most: {:.4g} {}. {}", beyond,
+           off.size(), beyond == 1 ? "is" : "are", frame_, particle, measured, kNames[which].unit, explained);
     } else {
-      fail(which, {}, "it is off by {:.4g} {} in frame {}; right runs are by at most {:.4g} {}: {}", measured,
-           kNames[which].unit, frame_, bound, kNames[which].unit, why);
+      fail(which, {}, "it is off by {:.4g} {} in frame {}. {}", measured, kNames[which].unit, frame_, explained);
     }
   }
 
@@ -372,12 +384,13 @@ class RunRelation::Implementation {
     if (of_a.empty() || of_b.empty()) return;
     double noisy = 0, greatest = 0, farthest = 0;
     int32_t who = -1;
+    std::vector<double> offs;
     const double unit = scale(of);
     for (std::size_t i = 0; i < both_.size(); ++i) {
       if (both_[i] == 0) continue;
       const Vec3 expected = map_.mapped(of_a[i], how, of, a.time.value_or(0)), got = of_b[at(in_b(i))];
       greatest = std::max(greatest, norm(expected) / unit);
-      const double off = distance(expected, got) / unit;
+      const double off = offs.emplace_back(distance(expected, got) / unit);
       if (!same_bits(expected, got) && !first_other_) first_other_ = {frame_, static_cast<int32_t>(i), off};
       if (off > farthest || who < 0) farthest = off, who = static_cast<int32_t>(i);
       for (const RelatedRun& run : noise) {
@@ -388,7 +401,7 @@ class RunRelation::Implementation {
     if (who < 0) return;
     const double bound = bound_of(which, noisy, greatest);
     if (std::isinf(bound)) return;
-    note(which, farthest, bound, who);
+    note(which, farthest, bound, who, offs);
     if (which != kPositions) return;
     const bool is_lost = bound > moved_;
     if (is_lost && moved_ > 0 && lost_ < 0) lost_ = frame_;
@@ -421,6 +434,7 @@ class RunRelation::Implementation {
     Verdict& verdict = found_[kCoupling].verdict;
     const std::vector<std::vector<int32_t>> of_a = sets_of(*a.coupling, {}), of_b = sets_of(*b.coupling, permutation_);
     ++verdict.checked;
+    ++found_[kCoupling].frames;
     if (of_a == of_b) return;
     for (const RelatedRun& run : noise) {
       if (run.coupling == nullptr || sets_of(*run.coupling, {}) == of_a) continue;
@@ -431,11 +445,13 @@ class RunRelation::Implementation {
     const auto [here, there] = std::mismatch(of_a.begin(), of_a.end(), of_b.begin(), of_b.end());
     const bool in_first = there == of_b.end() || (here != of_a.end() && *here < *there);
     ++verdict.measured;
-    fail(kCoupling, {{}, in_first ? *here : *there},
-         "a group of {} particles is in the {} run alone in frame {} ({} "
-         "groups and {}){}",
-         (in_first ? *here : *there).size(), in_first ? "first" : "second", frame_, of_a.size(), of_b.size(),
-         noise_runs_ > 0 ? "; a branch that no disturbed run took is possible: disturb more" : "");
+    ++found_[kCoupling].failing;
+    fail(
+        kCoupling, {{}, in_first ? *here : *there},
+        "the runs decide differently first in frame {}: {} coupling groups and {}. For example, one of {} particles is "
+        "in the {} run alone{}",
+        frame_, of_a.size(), of_b.size(), (in_first ? *here : *there).size(), in_first ? "first" : "second",
+        noise_runs_ > 0 ? "; a branch that no disturbed run took is possible: disturb more" : "");
   }
 
   std::string other_in_words() const {

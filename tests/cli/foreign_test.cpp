@@ -122,7 +122,7 @@ TEST_F(Foreign, KickOfThePageHoldsAndAGhostForceDoesNot) {
   python(replaced(right, "x[10:, 4:, 1] += kick", "x[10:, 4:, 1] += kick; x[12:, 3, 1] += 1e-6 * kick"));
   outcome = cutproof("kick kick.npz --json kick.json");
   EXPECT_EQ(outcome.status, 1) << outcome.output;
-  EXPECT_NE(outcome.output.find("particle 3 of piece 0 felt it first, from frame 12 on"), std::string::npos)
+  EXPECT_NE(outcome.output.find("Particle 3 of piece 0 felt it first, from frame 12 on"), std::string::npos)
       << outcome.output;
   document = json::parse(read("kick.json"));
   EXPECT_EQ(document["kicks"][0].at("pieces").at(0).at("felt"), 1);
