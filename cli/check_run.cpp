@@ -24,21 +24,22 @@ namespace cutproof::cli {
 
 namespace {
 
-// "2 pieces by the blade's sweep (60, 60 particles)"; of many, the largest.
+// "The blade has made 2 pieces (48 and 36 particles); the simulator couples 1 body."; of many, the largest.
 std::string in_words(const oracles::RunPieces& pieces) {
-  if (pieces.units == 0) return "the run has no tissue that pieces could be told of";
+  if (pieces.units == 0) return "The run has no tissue that pieces could be told of.";
   std::string sizes;
   for (std::size_t k = 0; k < std::min<std::size_t>(pieces.sizes.size(), 5); ++k) {
-    sizes += (k == 0 ? "" : ", ") + std::to_string(pieces.sizes[k]);
+    sizes += (k == 0 ? "" : k + 1 == pieces.sizes.size() ? " and " : ", ") + std::to_string(pieces.sizes[k]);
   }
   if (pieces.sizes.size() > 5) sizes += ", …";
-  const bool is_sure = pieces.at_most <= pieces.pieces;
-  std::string text = is_sure ? counted(pieces.pieces, "piece", "pieces")
-                             : fmt::format("{} to {} pieces", pieces.pieces, pieces.at_most);
-  text += fmt::format(" by the blade's sweep ({}{} {})", is_sure ? "" : "surely: ", sizes,
-                      pieces.of_cells ? "cells" : "particles");
-  if (pieces.coupled > 0) text += "; coupled as " + counted(pieces.coupled, "piece", "pieces");
-  return text;
+  const bool is_one = pieces.sizes.size() == 1 && pieces.sizes[0] == 1;
+  std::string text = fmt::format("{} {} ({} {})", pieces.last_cut < 0 ? "The tissue is" : "The blade has made",
+                                 counted(pieces.pieces, "piece", "pieces"), sizes,
+                                 pieces.of_cells ? (is_one ? "cell" : "cells") : (is_one ? "particle" : "particles"));
+  if (pieces.at_most > pieces.pieces)
+    text += fmt::format(", or up to {} where the blade only touches it", pieces.at_most);
+  if (pieces.coupled > 0) text += "; the simulator couples " + counted(pieces.coupled, "body", "bodies");
+  return text + ".";
 }
 
 nlohmann::json to_json(const std::string& file, const harness::JudgedRun& judged) {
@@ -114,7 +115,7 @@ int check_run(io::RunSegments segments, const std::string& file, const StateRepo
   write_document(reports.json, document);
   if (!reports.page.empty()) write_page_of(file, judged, pieces, document, reports);
   const Judging judging{"cutproof check", class_of("check", "run"), reports.again, Judging::Of::frames};
-  say("run {}: {} frames of {} particles; {}\n", file, judged.frames, judged.particles_at_end, in_words(judged.pieces));
+  say("run {}: {} frames of {} particles. {}\n", file, judged.frames, judged.particles_at_end, in_words(judged.pieces));
   Shown shown{reports.again};
   shown.in_stages = false;
   show_judged(judged.verdicts, judged.not_judged, judged.notes, shown, judging, reports, {}, since ? &*since : nullptr);

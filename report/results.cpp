@@ -134,8 +134,10 @@ void add_verdicts(const Field& document, Results& results) {
     const auto has_none = [](const Finding& one) {
       return one.clusters.empty() && one.particles.empty() && one.path.empty() && one.triangles.empty();
     };
-    return std::tuple(a.is_expected, a.frame, a.stage, has_none(a)) <
-           std::tuple(b.is_expected, b.frame, b.stage, has_none(b));
+    // Whatever fails with it, a ghost force says more.
+    const auto is_other = [](const Finding& one) { return one.property != "no ghost force"; };
+    return std::tuple(a.is_expected, is_other(a), a.frame, a.stage, has_none(a)) <
+           std::tuple(b.is_expected, is_other(b), b.frame, b.stage, has_none(b));
   });
   if (results.findings.size() > kMostFindings) {
     results.findings_left_out += static_cast<int64_t>(results.findings.size() - kMostFindings);
@@ -205,7 +207,7 @@ void add_series(const Field& document, Results& results) {
 }
 
 std::string pieces_in_words(int64_t pieces) {
-  return fmt::format("Its tissue is {} {}", pieces, pieces == 1 ? "piece" : "pieces");
+  return fmt::format("Its tissue is {} {}.", pieces, pieces == 1 ? "piece" : "pieces");
 }
 
 int64_t frame_or_none(const Field& frame) { return frame.is_nothing() ? -1 : frame.count(); }
@@ -215,8 +217,7 @@ void add_subject(const Field& document, Results& results) {
   if (results.command == "check_run") {
     results.scene = document["source"].text();
     results.particles = document["run"]["particles_at_end"].count();
-    if (document["pieces"]["units"].count() > 0)
-      results.pieces = "At its end: " + document["pieces"]["in_words"].text();
+    if (document["pieces"]["units"].count() > 0) results.pieces = document["pieces"]["in_words"].text();
     results.opens = frame_or_none(document["pieces"]["last_cut"]);
   } else if (results.command == "check_state") {
     results.scene = document["source"].text();
@@ -373,7 +374,7 @@ std::string of_what_was_judged(const Results& results) {
 
 std::string summary_sentence(const Results& results) {
   std::string sentence = of_what_was_judged(results);
-  if (!results.pieces.empty()) sentence += " " + results.pieces + ".";
+  if (!results.pieces.empty()) sentence += " " + results.pieces;
   return results.left_stages.empty() ? sentence : sentence + " " + left_in_words(results.left_stages);
 }
 
