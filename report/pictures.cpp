@@ -216,7 +216,7 @@ constexpr std::size_t kMostPatches = 500, kPatchesOfPage = 20'000;
 // others the middle, and how far they reach from it along each axis [m].
 void add_extent(json& detail, const State& state, const Box& outer) {
   Vec3 sum, half;
-  int64_t count = 0, nowhere = 0;
+  int64_t count = 0, nowhere = 0, no_number = 0;
   const auto each = [&](const auto& see) {
     for (std::size_t i = 0; i < state.x.size(); ++i) {
       if (state.alive[i] != 0) see(state.x[i], is_within(state.x[i], outer));
@@ -225,6 +225,7 @@ void add_extent(json& detail, const State& state, const Box& outer) {
   each([&](Vec3 x, bool is_drawn) {
     if (is_drawn) sum = sum + x;
     ++(is_drawn ? count : nowhere);
+    no_number += !std::isfinite(dot(x, x));
   });
   const Vec3 middle = sum / static_cast<double>(std::max<int64_t>(count, 1));
   each([&](Vec3 x, bool is_drawn) {
@@ -232,6 +233,7 @@ void add_extent(json& detail, const State& state, const Box& outer) {
       half[axis] = std::max(half[axis], std::abs(x[axis] - middle[axis]));
   });
   detail["nowhere"] = nowhere;
+  detail["noNumber"] = no_number;
   if (count > 0) {
     detail["middle"] = point_json(middle);
     detail["half"] = point_json(half);

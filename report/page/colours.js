@@ -63,6 +63,15 @@ function stretches(xyz, alive, edges) {
   return found;
 }
 
+const pieceColour = (piece) => (piece < 0 ? kGrey : piece === 0 ? kTissue : palette[(piece - 1) % palette.length]);
+
+// Of each piece its size, and its first particle, which tells it from others.
+function pieceKeys(of, pieces) {
+  const first = new Array(pieces).fill(-1), sizes = new Array(pieces).fill(0);
+  of.forEach((piece, i) => { if (piece >= 0 && ++sizes[piece] === 1) first[piece] = i; });
+  return sizes.map((n, piece) => [hexOf(pieceColour(piece)), `the piece of particle ${first[piece]} (${plural(n, 'particle')})`]);
+}
+
 // So many numbers have a key each; of more there is a scale.
 const kMostKeys = 9;
 
@@ -71,7 +80,7 @@ const decade = (code) => code / 4 - 18;
 
 // Each: what it is called, and of a picture the colour of each particle and a legend: words, a scale or keys.
 // `comparison`: with another run, or null. foreign: of somebody else's run, whose clusters are coupling groups.
-export function colourings(hasStretch, comparison, { foreign, hasPieces, hasGroups, moments } = { hasPieces: true, hasGroups: true, moments: [] }) {
+export function colourings(hasStretch, comparison, { foreign, hasPieces, hasGroups, moments, body } = { hasPieces: true, hasGroups: true, moments: [] }) {
   let farthest = 1e-9;  // so far, so that colours mean the same from frame to frame
   // Of all moments, so that a colour is one distance.
   const ranges = moments.map((moment) => moment.apart && moment.apart.codes).filter(Boolean);
@@ -85,9 +94,10 @@ export function colourings(hasStretch, comparison, { foreign, hasPieces, hasGrou
         let pieces = 0;
         for (const piece of moment.piece) if (piece >= pieces) pieces = piece + 1;
         return {
-          colour: (i) => (moment.piece[i] < 0 ? kGrey : moment.piece[i] === 0 ? kTissue
-            : palette[(moment.piece[i] - 1) % palette.length]),
-          words: pieces <= 1 ? 'One piece of tissue.' : `${pieces} pieces of tissue, each in a colour of its own; the largest is pink.`,
+          colour: (i) => pieceColour(moment.piece[i]),
+          words: pieces <= 1 ? 'One piece of tissue.' : `${pieces} pieces of tissue, each in a colour of its own${pieces > kMostKeys ? '; the largest is pink' : ''}.`,
+          // A page that holds some particles only has other numbers of them.
+          keys: pieces > 1 && pieces <= kMostKeys && body && body.kept === body.particles ? pieceKeys(moment.piece, pieces) : undefined,
         };
       },
     },

@@ -16,8 +16,8 @@ export function comparisonCard(comparison, isForeign, jump) {
     const buttons = [go(any, 'Show me: the first difference', 'to-first-apart')];
     if (!decision) said.push(element('p', { text: isForeign ? 'In all of them the same particles are there.' : 'In all of them the same particles are there, in the same clusters, under the same triangles.' }));
     else if (decision.frame !== any.frame || decision.stage !== any.stage) {
-      said.push(element('p', { text: `They decide differently first ${when(decision)}: ${decision.differs}.` }));
-      buttons.push(go(decision, 'Show me: the first decision', 'to-first-decision'));
+      said.unshift(element('p', { text: `They decide differently first ${when(decision)}: ${decision.differs}.` }));
+      buttons.unshift(go(decision, 'Show me: the first decision', 'to-first-decision'));
     }
     if (greatest) {
       said.push(element('p', { text: `They are farthest apart ${when(greatest)}: ${far(greatest.max)}.` }));

@@ -18,6 +18,8 @@ const besides = comparison && comparison.shown ? new Moments(data.besideFirst, '
 const sideNames = besides ? [comparison.ownName, comparison.name] : [];
 const last = (data.moments || []).length - 1;
 const kFramesPerSecond = 15;
+// Failures of a run that the colours of what is coupled show.
+const kOfCoupling = ['no coupling across pieces', 'pieces coupled within', 'pieces as said'];
 const hasGroups = Boolean(data.frames) && data.frames.clusters.some((n) => n > 0);
 
 // spot: a particle that is marked where no verdict names any, by its place on the page.
@@ -167,6 +169,15 @@ function say(where, ...parts) {
   for (const more of had.slice(parts.length)) more.remove();
 }
 
+// Particles that are not drawn, by reason.
+function notDrawn(about) {
+  const { frame, removed } = data.frames;
+  const gone = removed.reduce((sum, n, k) => sum + (frame[k] <= about.frame ? n : 0), 0);
+  const later = data.foreign && data.command !== 'check_state' ? data.body.particles - about.particles - gone : 0;
+  const reasons = [[later, 'not yet there'], [about.noNumber, 'at no number'], [about.nowhere - about.noNumber, 'far away']].filter(([n]) => n > 0);
+  return reasons.length ? `not drawn: ${reasons.map(([n, why]) => `${plural(n, 'particle')} ${why}`).join(', ')}` : '';
+}
+
 async function update() {
   const ticket = ++shown;
   const moment = data.moments[state.at];
@@ -179,7 +190,7 @@ async function update() {
   if (moment.removed > 0) facts.push(`${count(moment.removed)} removed in this frame`);
   const abouts = besides ? [moment, data.besideMoments[state.at]] : [moment];
   abouts.forEach((about, k) => {
-    const text = about.nowhere > 0 ? `${plural(about.nowhere, 'particle')} not drawn: far outside, or no numbers` : '';
+    const text = notDrawn(about);
     if (text) facts.push(besides ? `${sideNames[k]}: ${text}` : text);
     const side = document.querySelectorAll('.side')[k];
     if (side) side.textContent = text ? `${sideNames[k]}: ${text}` : sideNames[k];
@@ -301,9 +312,14 @@ async function showApart(frame, stage) {
 // At the top of a page that opens stands what is to be read first.
 async function showFinding(k, scrolls = true) {
   setPlaying(false);
-  const { marks } = data.findings[k];
+  const { marks, property } = data.findings[k];
+  const colour = kOfCoupling.includes(property) ? 'cluster' : null;
+  if (view && colours[colour]) {
+    look.colouring = colours[colour];
+    byId('colour').value = colour;
+  }
   await go(Math.max(marks.moment, 0), k);
-  if (view) view.flyToMarks();
+  if (view && !view.flyToMarks() && data.foreign) view.orbit.goHome();
   if (scrolls) byId('view').scrollIntoView({ block: 'nearest' });
 }
 
@@ -319,8 +335,7 @@ function findings() {
     section.append(element('p', { text: `All that was judged holds${data.findings.length ? ', but for what the scene expects to fail' : ''}.${near ? ` The nearest to its bound is ${near.property}${data.foreign ? '' : ` after ${near.stage}`}, at ${figure(near.ofBound)} of the bound, in frame ${near.frame}.` : ''}` }));
   }
   const apart = comparison && comparisonCard(comparison, data.foreign, showApart);
-  // What was judged of somebody else's is what fails; of our own the distance was asked for.
-  section.append(...(data.foreign ? [...cards(data, showFinding), apart] : [apart, ...cards(data, showFinding)]).filter(Boolean));
+  section.append(...[apart, ...cards(data, showFinding)].filter(Boolean));
   if (data.findingsLeftOut > 0) section.append(element('p', { class: 'muted', text: `${plural(data.findingsLeftOut, 'later failure')} of the same properties are counted in the table, and not shown.` }));
   section.append(element('h3', { text: data.checked ? 'See it again' : 'Judge it' }), command(data.again));
   const notes = [...data.notReached.map((text) => `Not reached: ${text}`), ...data.notes];

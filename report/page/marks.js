@@ -30,7 +30,7 @@ export function markedWords({ particles, path, members, corners, partly, exact, 
     if (isYellow) said.push(`Yellow: the members of ${which}${isJoined ? `; lines join ${joined.length === 1 ? 'them' : 'those of each'}` : ''}.`);
     else if (isJoined) said.push(`Lines join the members of ${which}.`);
   }
-  if (said.length === 0) said.push('The verdict names no place.');
+  if (said.length === 0) said.push('The verdict marks no place.');
   if (partly) said.push('There are more than are marked.');
   if (!exact) said.push('The recording has no moment after this stage; this is the next one.');
   return said.join(' ');

@@ -88,6 +88,7 @@ export class Orbit {
   }
 
   goHome() {
+    if (this.beforeHome) this.beforeHome();
     this.fly(this.home.target, this.home.distance, this.home);
   }
 

@@ -20,6 +20,8 @@ export function command(text) {
   return element('div', { class: 'again' }, code, element('div', { class: 'row' }, copy, said));
 }
 
+const times = (ofBound) => (ofBound >= 100 ? ofBound.toExponential(1).replace('e+', 'e') : String(Number(ofBound.toPrecision(2))));
+
 // Measured over bound: the bar ends at the bound, and what goes beyond is drawn beyond it.
 function bar(row, fails) {
   if (row.ofBound === null) return element('span', { class: 'muted', text: row.bound === '0' && !fails ? 'exact' : '' });
@@ -28,7 +30,7 @@ function bar(row, fails) {
   const filled = element('span', { class: fails ? 'filled bad' : 'filled' });
   filled.style.width = `${(100 * share) / 1.25}%`;
   const limit = element('span', { class: 'limit' });
-  const text = row.ofBound >= 100 ? `${row.ofBound.toExponential(1).replace('e+', 'e')} times the bound` : String(Number(row.ofBound.toPrecision(2)));
+  const text = row.ofBound >= 100 ? `${times(row.ofBound)} times the bound` : times(row.ofBound);
   return element('span', { class: 'measure' }, element('span', { class: 'bar', 'aria-hidden': 'true' }, filled, limit), element('span', { class: 'share', text }));
 }
 
@@ -84,6 +86,17 @@ export function table(data, jump) {
 
 const fails = (data) => data.rows.some((row) => row.failed + row.expected > 0);
 
+// The witness of somebody else's run counts what is wrong.
+function figuresOf({ measured, bound, unit, ofBound, marks }, isForeign) {
+  if (measured === 'nothing') return '';
+  const isCount = bound === '0' && !unit, said = [];
+  if (!isCount) said.push(`Measured: ${withUnit(measured, unit)}`);
+  else if (!isForeign) said.push(`Counted: ${measured}`);
+  said.push(bound === '0' ? 'never allowed (bound 0)' : ofBound === null ? `bound ${withUnit(bound, unit)}` : `${times(ofBound)} times the bound of ${withUnit(bound, unit)}`);
+  const text = `${said.join(', ')}. `;
+  return `${text[0].toUpperCase()}${text.slice(1)}${isForeign && unit && !hasPlace(marks) ? 'It concerns the whole body. ' : ''}`;
+}
+
 // One card for each property and stage that fails, with its first witness; its later ones behind it.
 export function cards(data, show) {
   const groups = new Map(), isLone = data.moments.length < 2;  // a state has no frames
@@ -101,7 +114,7 @@ export function cards(data, show) {
     found.push(element('article', { class: `card ${first.expected ? 'warn' : 'bad'}` },
       element('h3', {}, nameNode(first.property, data.command), !data.foreign && element('span', { class: 'muted', text: ` after ${first.stage}` })),
       text,
-      element('p', { class: 'muted small' }, first.measured !== 'nothing' && element('span', {}, `${first.bound === '0' && !first.unit ? 'Counted' : 'Measured'} ${withUnit(first.measured, first.unit)}, bound ${withUnit(first.bound, first.unit)} (`, ...sourceNodes(first.source), '). '),
+      element('p', { class: 'muted small' }, element('span', { text: figuresOf(first, data.foreign) }),
         element('span', { text: row && row.failed + row.expected > 1 ? `It fails in ${count(row.failed + row.expected)} of ${plural(row.judged, 'verdict')}.` : '' }),
         first.expected && element('span', { text: ' The scene expects it to fail.' })),
       element('div', { class: 'row' }, button(members[0], isLone ? 'Show me' : hasPlace(first.marks) ? `Show me: frame ${first.frame}` : `Go to frame ${first.frame}`)),

@@ -50,6 +50,7 @@ export class View {
     this.camera = new PerspectiveCamera(32, 1, 0.1, 1000);
     this.camera.up.set(0, 0, 1);
     this.orbit = new Orbit(canvas, this.camera, () => { this.hurry(); this.draw(); });
+    this.orbit.beforeHome = () => this.fitHome();
     this.orbit.onAltDrag = (dx, dy, isTurn) => (isTurn ? this.plane.turn(dx * 0.5, -dy * 0.5) : this.plane.move(-dy * this.plane.reach * 0.01));
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.draw());
@@ -114,10 +115,11 @@ export class View {
     const home = this.orbit.home, begins = 1.12 * from([0, 0, 0], begun);
     home.distance = begins;
     if (this.data.foreign) {
-      // Around the middle of whatever moment is shown.
-      const abouts = [...this.data.moments, ...(this.data.besideMoments || [])].filter((about) => about.half);
-      const half = [0, 1, 2].map((k) => abouts.reduce((most, about) => Math.max(most, about.half[k] / spacing), 0));
-      home.distance = Math.min(Math.max(begins, 0.93 * from([0, 0, 0], cornersOf(half.map((x) => -x), half))), kFarthest * begins);
+      // Around the middle of the moment that is shown, which the view follows; the other run may be elsewhere.
+      const abouts = (this.abouts || [this.data.moments[0], ...(this.data.besideMoments || []).slice(0, 1)]).filter((about) => about.half);
+      if (abouts.length === 0) return;
+      const end = (about, sign) => about.middle.map((x, k) => (x - abouts[0].middle[k] + sign * about.half[k]) / spacing);
+      home.distance = Math.max(begins, 0.93 * from([0, 0, 0], abouts.flatMap((about) => cornersOf(end(about, -1), end(about, 1)))));
       return;
     }
     const corners = this.cornersOfRun();
@@ -260,6 +262,7 @@ export class View {
     const { middle } = abouts[0], spacing = this.data.body.spacing || 1;
     if (this.data.foreign && middle) this.orbit.follow(middle.map((x, k) => (x - this.centre[k]) / spacing));
     const legends = this.sides.map((side, k) => side.show(moments[k], abouts[k], seen, k === 0 ? marks : null, about));
+    this.abouts = abouts;
     this.draw();
     return legends[0];
   }
@@ -288,6 +291,7 @@ export class View {
     const middle = low.map((x, k) => (x + high[k]) / 2);
     const isTriangle = this.sides[0].facing !== null, angles = isTriangle ? this.anglesFacing(this.sides[0].facing) : undefined;
     // A small body is seen whole.
+    if (this.data.foreign) this.fitHome();
     if (this.data.body.particles < kSmallBody) return [this.orbit.home.target, this.orbit.home.distance, angles];
     // Never so near that nobody sees where in the body it is; a triangle of the skin is small.
     const seen = Math.min(this.radius, Math.max(1.8 * radius + 2, this.radius * (isTriangle ? 0.3 : 0.5)));
