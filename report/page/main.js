@@ -196,7 +196,7 @@ async function update() {
     if (side) side.textContent = text ? `${sideNames[k]}: ${text}` : sideNames[k];
   });
   if (data.blade) facts.push(moment.blade ? 'blade down' : 'blade up');
-  const apart = apartInWords(comparison, moment);
+  const apart = apartInWords(comparison, moment, data.foreign);
   if (apart) facts.push(apart);
   say(status, element('strong', { text: words(moment) }), element('span', { class: 'muted', text: ` · ${facts.join(' · ')}` }));
   witness.replaceChildren(...(found ? unbroken(`${found.property} fails here: ${found.text}`) : []));

@@ -227,6 +227,7 @@ export class Tissue {
     const hasParticles = look.particles || !hasSkin;
     let xyz = null;
     const placesOfIt = () => xyz || (xyz = places(moment.x, moment, centre, spacing));
+    this.shown = { alive: moment.alive, places: placesOfIt };
     const { colour, shows, words, scale, keys } = look.colouring.of({ moment, first, places: placesOfIt, start, edges, stage: about.stage, isStart: about.start, apart: about.apart });
     const hidden = hasParticles && !look.isCut ? this.covered(moment, edges, placesOfIt) : null;
     // Written over in each moment: a browser that makes and drops megabytes so often stops to tidy up.

@@ -1,5 +1,5 @@
 // The 3D view: one run, or two beside each other, seen by one camera. Lengths are in h, the middle of the body is 0.
-import { Color, PerspectiveCamera, Scene, WebGLRenderer } from 'three';
+import { Color, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from 'three';
 import { places } from './coding.js';
 import { CutPlane } from './cut_plane.js';
 import { Orbit } from './orbit.js';
@@ -9,6 +9,8 @@ import { Tissue } from './tissue.js';
 const kFarthest = 2;
 // A body of fewer particles is small. Beside what is marked, the view's middle lies so far towards that of the body.
 const kSmallBody = 1000, kTowardsMiddle = 0.3;
+// From the pointer to a particle that it means.
+const kNearPixels = 8;
 
 // While somebody scrubs, plays or turns where pictures take long: a picture of so many times fewer pixels along each
 // side now rather than a sharp one later, of the next as many if a few in a row take too long; and a sharp one after so
@@ -52,6 +54,7 @@ export class View {
     this.orbit = new Orbit(canvas, this.camera, () => { this.hurry(); this.draw(); });
     this.orbit.beforeHome = () => this.fitHome();
     this.orbit.onAltDrag = (dx, dy, isTurn) => (isTurn ? this.plane.turn(dx * 0.5, -dy * 0.5) : this.plane.move(-dy * this.plane.reach * 0.01));
+    if (data.body.kept === data.body.particles) canvas.addEventListener('pointermove', (event) => { if (!event.buttons) this.tell(event.offsetX, event.offsetY); });
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.draw());
     addEventListener('beforeprint', () => this.render());
@@ -255,13 +258,30 @@ export class View {
     this.canvas.dataset.drawn = this.isQuick ? 'quick' : 'sharp';
   }
 
+  // The number of the particle in front at a place of the canvas, as its title.
+  tell(x, y) {
+    const { clientHeight } = this.canvas, at = new Vector3();
+    const k = Math.max(this.parts().findIndex(([left, below, width, height]) => x >= left && x < left + width && clientHeight - y >= below && clientHeight - y < below + height), 0);
+    const [left, below, width, height] = this.parts()[k], { shown, body } = this.sides[k];
+    if (!shown) return;
+    const xyz = shown.places();
+    let found = -1, nearest = Infinity;
+    for (let i = 0; i < shown.alive.length; ++i) {
+      if (!shown.alive[i]) continue;
+      at.fromArray(xyz, 3 * i).applyMatrix4(body.matrixWorld).project(this.camera);
+      const off = Math.hypot(left + (at.x + 1) * width / 2 - x, below + (at.y + 1) * height / 2 - (clientHeight - y));
+      if (off < kNearPixels && at.z < nearest) [found, nearest] = [i, at.z];
+    }
+    this.canvas.title = found < 0 ? '' : `particle ${found}`;
+  }
+
   // moments: of each run its arrays; abouts: what the page says of them. Returns the legend, of the first.
   show(moments, abouts, look, marks) {
     const about = { centre: this.centre, start: this.start, edges: this.edges, first: this.first };
     const seen = { ...look, way: look.way && !marks && !this.plane.isOn, isCut: this.plane.isOn };
     const { middle } = abouts[0], spacing = this.data.body.spacing || 1;
     if (this.data.foreign && middle) this.orbit.follow(middle.map((x, k) => (x - this.centre[k]) / spacing));
-    const legends = this.sides.map((side, k) => side.show(moments[k], abouts[k], seen, k === 0 ? marks : null, about));
+    const legends = this.sides.map((side, k) => side.show(moments[k], abouts[k], seen, k === 0 || this.data.foreign ? marks : null, about));
     this.abouts = abouts;
     this.draw();
     return legends[0];
