@@ -33,12 +33,15 @@ std::string in_words(const oracles::RunPieces& pieces) {
   }
   if (pieces.sizes.size() > 5) sizes += ", …";
   const bool is_one = pieces.sizes.size() == 1 && pieces.sizes[0] == 1;
-  std::string text = fmt::format("{} {} ({} {})", pieces.last_cut < 0 ? "The tissue is" : "The blade has made",
-                                 counted(pieces.pieces, "piece", "pieces"), sizes,
-                                 pieces.of_cells ? (is_one ? "cell" : "cells") : (is_one ? "particle" : "particles"));
-  if (pieces.at_most > pieces.pieces)
-    text += fmt::format(", or up to {} where the blade only touches it", pieces.at_most);
-  if (pieces.coupled > 0) text += "; the simulator couples " + counted(pieces.coupled, "body", "bodies");
+  std::string text =
+      fmt::format("{} {} ({} {})", pieces.pieces > pieces.at_first ? "The blade has made" : "The tissue is",
+                  counted(pieces.pieces, "piece", "pieces"), sizes,
+                  std::string(pieces.of_cells ? "cell" : "particle") + (is_one ? "" : "s"));
+  const bool is_open = pieces.at_most > pieces.pieces;
+  if (is_open) text += fmt::format(". Where the blade only touches it, up to {} pieces are possible", pieces.at_most);
+  if (pieces.coupled > 0)
+    text +=
+        fmt::format("{} simulator couples {}", is_open ? ". The" : "; the", counted(pieces.coupled, "body", "bodies"));
   return text + ".";
 }
 

@@ -61,9 +61,12 @@ with Browser(path) as page:
     # What is coupled though the blade has been between has one colour, and two as pieces.
     moment = first["frame"]
     assert page.data(f"moments[{moment}].components") == 2
-    page.choose("colour", "cluster")
     page.until("return document.getElementById('legend').textContent.includes('are coupled with each other')")
     page.picture(work / "heals_coupled.png")
+    page.choose("colour", "piece")
+    page.until("return document.getElementById('legend').textContent.includes('the piece of particle 0 (')")
+    card = page.text("#findings article")
+    assert "Never allowed (bound 0)." in card and "judged frames, first in frame" in card, card
     # It plays to its end.
     page.driver.find_element(By.ID, "play").click()
     page.until("return document.documentElement.dataset.moment == arguments[0]", document["run"]["frames"] - 1)
@@ -114,6 +117,8 @@ with Browser(path) as page:
     first = page.data("findings[0]")
     assert not any(first["marks"][name] for name in ("particles", "path", "members", "corners")), first
     page.shown(first["marks"]["moment"], 0)
+    card = page.text("#findings article")
+    assert "times the bound of" in card and "It concerns the whole body." in card, card
     seen = page.pixels()["sum"]
     page.scrub(0)
     page.scrub(first["marks"]["moment"])
@@ -135,6 +140,7 @@ with Browser(path) as page:
                            for option in page.driver.find_elements(By.CSS_SELECTOR, "#colour option")]
     for frame in range(4):
         assert page.data(f"moments[{frame}].particles") == 64 + 2 * frame
+    assert "not drawn: 6 particles not yet there" in page.text("#status"), page.text("#status")
     page.scrub(3)
     particles = page.pixels()["sum"]
     page.pixels_after(lambda: page.choose("show", "skin"), {particles})
@@ -253,7 +259,7 @@ for name, map_, off, status in (("mapped", "units:4,1,1", 0, 0), ("strays", "uni
         if name == "far":
             page.scrub(3)
             for where in ("#status", ".side.other"):
-                assert "64 particles not drawn: far outside" in page.text(where), page.text(where)
+                assert "not drawn: 64 particles far away" in page.text(where), page.text(where)
             page.scrub(2)
             assert page.text(".side.other") == "far_b.h5", page.text(".side.other")
         elif off:
