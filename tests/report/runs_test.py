@@ -67,6 +67,16 @@ with Browser(path) as page:
     page.until("return document.getElementById('legend').textContent.includes('the piece of particle 0 (')")
     card = page.text("#findings article")
     assert "Never allowed (bound 0)." in card and "judged frames, first in frame" in card, card
+    # The pointer tells a particle's number.
+    told = page.ask("""
+      const canvas = document.getElementById('canvas'), { left, top, width, height } = canvas.getBoundingClientRect();
+      const titles = new Set();
+      for (let x = 0; x < width; x += 10) for (let y = 0; y < height; y += 10) {
+        canvas.dispatchEvent(new PointerEvent('pointermove', { clientX: left + x, clientY: top + y }));
+        titles.add(canvas.title);
+      }
+      return [...titles];""")
+    assert "" in told and len(told) > 20 and all(one in ("", f"particle {one[9:]}") for one in told), told
     # It plays to its end.
     page.driver.find_element(By.ID, "play").click()
     page.until("return document.documentElement.dataset.moment == arguments[0]", document["run"]["frames"] - 1)
