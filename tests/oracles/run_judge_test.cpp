@@ -249,9 +249,11 @@ TEST(RunJudge, RejectsNumbersOfAFrameThatAreNone) {
     plant(planted);
     EXPECT_EQ(failing_of({}, planted, x), text);
   };
-  expect("finite: energy is not a number in frame 0", [](RunFrame& f) { f.energy = NAN; });
-  expect("finite: contact_impulse is not a number in frame 0", [](RunFrame& f) { f.contact_impulse->z = NAN; });
-  expect("finite: the spin of particle 1 is not a number in frame 0", [&](RunFrame& f) { f.spin = wrong; });
+  expect("finite: energy is not a number in frame 0. Later frames are not judged", [](RunFrame& f) { f.energy = NAN; });
+  expect("finite: contact_impulse is not a number in frame 0. Later frames are not judged",
+         [](RunFrame& f) { f.contact_impulse->z = NAN; });
+  expect("finite: the spin of particle 1 is not a number in frame 0. Later frames are not judged",
+         [&](RunFrame& f) { f.spin = wrong; });
   const std::vector<int32_t> parent = {-1, 2}, itself = {0, -1};
   expect("run well formed: particle 1 was split from 2 of 2", [&](RunFrame& f) { f.parent = parent; });
   expect("", [&](RunFrame& f) { f.parent = itself; });
