@@ -107,7 +107,7 @@ export function colourings(hasStretch, comparison, { foreign, hasPieces, hasGrou
         const chosen = choices(moment, edges, first && first !== moment ? choices(first, edges, null) : null);
         return {
           colour: (i) => (moment.cluster[i] < 0 ? kGrey : clusterColours[chosen[moment.cluster[i]]]),
-          words: foreign ? 'Particles of one colour are coupled with each other, by one group or a chain of them; grey: in no group.' : `Each particle has the colour of the first cluster that holds it${edges ? '; where two such meet, or no more than two layers of removed particles lie between them, their colours differ' : ''}.`,
+          words: foreign ? 'Particles of one colour are coupled with each other, by one coupling group or a chain of them; grey: in none.' : `Each particle has the colour of the first cluster that holds it${edges ? '; where two such meet, or no more than two layers of removed particles lie between them, their colours differ' : ''}.`,
         };
       },
     },

@@ -71,7 +71,7 @@ function timeline() {
   data.moments.forEach((moment, k) => { if (moment.removed > 0 && isEnd(k)) mark(k, 'cut', 9, 5); });
   for (const finding of data.findings) if (finding.marks.moment >= 0) mark(finding.marks.moment, finding.expected ? 'warn' : 'bad', 0, 8);
   const keys = [];
-  if (data.findings.some((f) => !f.expected)) keys.push(['bad', 'a verdict fails']);
+  if (data.findings.some((f) => !f.expected)) keys.push(['bad', data.foreign ? 'first failure' : 'a verdict fails']);
   if (data.findings.some((f) => f.expected)) keys.push(['warn', 'fails as expected']);
   if (data.moments.some((m) => m.removed > 0)) keys.push(['cut', 'particles are removed']);
   if (data.foreign) {
