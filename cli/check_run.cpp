@@ -38,7 +38,8 @@ std::string in_words(const oracles::RunPieces& pieces) {
                   counted(pieces.pieces, "piece", "pieces"), sizes,
                   std::string(pieces.of_cells ? "cell" : "particle") + (is_one ? "" : "s"));
   const bool is_open = pieces.at_most > pieces.pieces;
-  if (is_open) text += fmt::format(". Where the blade only touches it, up to {} pieces are possible", pieces.at_most);
+  if (is_open)
+    text += fmt::format(". Where the blade only touches the tissue, up to {} pieces are possible", pieces.at_most);
   if (pieces.coupled > 0)
     text +=
         fmt::format("{} simulator couples {}", is_open ? ". The" : "; the", counted(pieces.coupled, "body", "bodies"));

@@ -381,7 +381,8 @@ std::string likely_cause(const KickedRuns& runs, const KickAnswer& answer) {
   if (!std::isfinite(share)) return "";
   if (share > kOfASolver || 2 * felt <= others) return fmt::format("; by {:.2g} of the kick at most", share);
   return fmt::format(
-             ". It is global coupling, {:.2g} of the kick, as by a solver or a time step that all pieces share. ",
+             ". The cause is global coupling, {:.2g} of the kick, as by a solver or a time step that all pieces "
+             "share. ",
              share) +
          (runs.tolerance > 0 ? fmt::format("The declared tolerance is {:g}", runs.tolerance)
                              : "If it is meant, declare a tolerance");

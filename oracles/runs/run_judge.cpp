@@ -306,10 +306,10 @@ class RunJudge::Implementation {
     if (which == kFinite) {
       text += ". Later frames are not judged";
     } else if (found.failing == 1) {
-      text += fmt::format(". It fails in this frame alone, of {} judged", found.frames);
+      text += fmt::format(". The property fails in this frame alone, of {} judged", found.frames);
     } else {
-      text += fmt::format(". It fails in {} of {} judged frames, first in frame {}", found.failing, found.frames,
-                          found.verdict.frame);
+      text += fmt::format(". The property fails in {} of {} judged frames, first in frame {}", found.failing,
+                          found.frames, found.verdict.frame);
     }
   }
   // Whether a comparison is within its bound; the first that is not is kept, or else that which comes nearest.

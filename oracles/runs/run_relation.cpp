@@ -139,7 +139,12 @@ class RunRelation::Implementation {
     vectors(kVelocities, &RunFrame::velocities, Follows::velocity, {1, -1, 0}, a.frame, b.frame, noise);
     vectors(kSpin, &RunFrame::spin, Follows::axial, {2, -1, 1}, a.frame, b.frame, noise);
     totals(a.frame, b.frame, noise);
-    if (a.is_new_coupling || b.is_new_coupling) couplings(a, b, noise);
+    if (a.is_new_coupling || b.is_new_coupling) {
+      couplings(a, b, noise);
+    } else if (Found& found = found_[kCoupling]; found.frames > 0 && !may_branch_) {
+      ++found.frames;
+      found.failing += is_coupled_otherwise_;
+    }
   }
 
   void see_end_of_some(int64_t frame) {
@@ -179,7 +184,8 @@ class RunRelation::Implementation {
     }
     for (Found& found : found_) {
       if (found.verdict.holds || found.frames == 0) continue;
-      found.verdict.witness.text += fmt::format(". It fails in {} of {} compared frames", found.failing, found.frames);
+      found.verdict.witness.text +=
+          fmt::format(". The property fails in {} of {} compared frames", found.failing, found.frames);
     }
     if (lost_ >= 0) {
       notes_.push_back(
@@ -435,7 +441,8 @@ class RunRelation::Implementation {
     const std::vector<std::vector<int32_t>> of_a = sets_of(*a.coupling, {}), of_b = sets_of(*b.coupling, permutation_);
     ++verdict.checked;
     ++found_[kCoupling].frames;
-    if (of_a == of_b) return;
+    is_coupled_otherwise_ = of_a != of_b;
+    if (!is_coupled_otherwise_) return;
     for (const RelatedRun& run : noise) {
       if (run.coupling == nullptr || sets_of(*run.coupling, {}) == of_a) continue;
       ++verdict.inconclusive;  // rounding decides which groups there are
@@ -473,6 +480,7 @@ class RunRelation::Implementation {
   double extent_ = 0, moved_ = 0, substep_ = 0;
   std::optional<double> time_at_first_;
   std::optional<Other> first_other_;
+  bool is_coupled_otherwise_ = false;
   bool may_branch_ = false;  // a disturbed run has: from then on decisions are not compared
   RelationSharpness sharpest_;
 };

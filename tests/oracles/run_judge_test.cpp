@@ -404,7 +404,7 @@ TEST(RunJudge, NamesTwoParticlesOfTheGroupThatJoinsWhatTheBladeHasParted) {
   EXPECT_EQ(across->witness.particles, (std::vector<int32_t>{7, 22})) << across->witness.text;
   for (const char* const words : {" of 24 particles are coupled to another piece in frame 5",
                                   "one group couples particles 7 and 22, which the blade has parted",
-                                  "It fails in 5 of 10 judged frames, first in frame 5"})
+                                  "The property fails in 5 of 10 judged frames, first in frame 5"})
     EXPECT_NE(across->witness.text.find(words), std::string::npos) << across->witness.text;
 }
 
@@ -427,9 +427,9 @@ TEST(RunJudge, SaysHowMuchIsWrongAndInHowManyFrames) {
   for (Vec3& v : pushed.v[8]) v.x += 1;
   const std::string spin = witness_of(lost, "angular momentum"), push = witness_of(pushed, "linear momentum");
   EXPECT_EQ(spin.find("75 % of the angular momentum is lost in frame 8, although no outside force acts"), 0U) << spin;
-  EXPECT_NE(spin.find("It fails in this frame alone, of 9 judged"), std::string::npos) << spin;
+  EXPECT_NE(spin.find("The property fails in this frame alone, of 9 judged"), std::string::npos) << spin;
   EXPECT_NE(push.find("the whole body gains 1 m/s"), std::string::npos) << push;
-  EXPECT_NE(push.find("It fails in 2 of 9 judged frames, first in frame 8"), std::string::npos) << push;
+  EXPECT_NE(push.find("The property fails in 2 of 9 judged frames, first in frame 8"), std::string::npos) << push;
 }
 
 struct Fault {

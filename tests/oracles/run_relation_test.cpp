@@ -157,8 +157,8 @@ TEST(RunRelation, RejectsOneParticleThatIsBeyondTheBound) {
       EXPECT_EQ(judged.of("related positions").witness.particles, std::vector<int32_t>{11}) << word;
       const std::string text = judged.of("related positions").witness.text;
       const char* const explained = has_noise ? "64 times the noise of the disturbed runs explains" : "Rounding alone";
-      for (const char* const words :
-           {"1 of 18 particles is off in frame 7, particle 11 by most: ", " m. ", explained, "It fails in 1 of "})
+      for (const char* const words : {"1 of 18 particles is off in frame 7, particle 11 by most: ", " m. ", explained,
+                                      "The property fails in 1 of "})
         EXPECT_NE(text.find(words), std::string::npos) << text;
       EXPECT_EQ(judged.of("related positions").frame, 7) << word;
       EXPECT_NEAR(judged.of("related positions").measured, 1e-11, 1e-12) << word;
