@@ -335,7 +335,8 @@ function findings() {
     section.append(element('p', { text: `All that was judged holds${data.findings.length ? ', but for what the scene expects to fail' : ''}.${near ? ` The nearest to its bound is ${near.property}${data.foreign ? '' : ` after ${near.stage}`}, at ${figure(near.ofBound)} of the bound, in frame ${near.frame}.` : ''}` }));
   }
   const apart = comparison && comparisonCard(comparison, data.foreign, showApart);
-  section.append(...[apart, ...cards(data, showFinding)].filter(Boolean));
+  // Of two runs, where they part comes first; of a kick, what others feel.
+  section.append(...(data.foreign && !comparison?.shown ? [...cards(data, showFinding), apart] : [apart, ...cards(data, showFinding)]).filter(Boolean));
   if (data.findingsLeftOut > 0) section.append(element('p', { class: 'muted', text: `${plural(data.findingsLeftOut, 'later failure')} of the same properties are counted in the table, and not shown.` }));
   section.append(element('h3', { text: data.checked ? 'See it again' : 'Judge it' }), command(data.again));
   const notes = [...data.notReached.map((text) => `Not reached: ${text}`), ...data.notes];
