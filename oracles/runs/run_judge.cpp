@@ -778,10 +778,12 @@ class RunJudge::Implementation {
       const std::array<int32_t, 2> direct = parted_in_a_group(apart);
       const auto [a, b] = direct[0] >= 0 ? direct : example;
       fail(kAcross, {{}, {a, b}},
-           "{} of {} {} coupled to another piece in frame {}. For example, {} couples particles {} and {}, which {}",
+           "{} of {} {} coupled to another piece in frame {}. For example, {} joins particles {} and {}, which {}",
            across, counted(units_, one, several), across == 1 ? "is" : "are", frame_,
-           direct[0] >= 0 ? "one group" : "a chain of groups", a, b,
-           has_blade_ ? "the blade has parted" : "no tissue joins");
+           direct[0] >= 0 ? "one coupling group"
+           : by_cells()   ? "a chain of cells"
+                          : "a chain of coupling groups",
+           a, b, has_blade_ ? "the blade has parted" : "no tissue connects");
     }
     const SweptTissue::Pieces together = tissue_->together();
     std::vector<int32_t> component_of(at(together.count), -1), first(at(together.count), -1);

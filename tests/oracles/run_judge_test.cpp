@@ -403,7 +403,7 @@ TEST(RunJudge, NamesTwoParticlesOfTheGroupThatJoinsWhatTheBladeHasParted) {
   ASSERT_FALSE(across->holds);
   EXPECT_EQ(across->witness.particles, (std::vector<int32_t>{7, 22})) << across->witness.text;
   for (const char* const words : {" of 24 particles are coupled to another piece in frame 5",
-                                  "one group couples particles 7 and 22, which the blade has parted",
+                                  "one coupling group joins particles 7 and 22, which the blade has parted",
                                   "The property fails in 5 of 10 judged frames, first in frame 5"})
     EXPECT_NE(across->witness.text.find(words), std::string::npos) << across->witness.text;
 }
