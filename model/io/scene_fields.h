@@ -172,8 +172,9 @@ void describe(auto& v, StepParameters& s) {
                      "paper's Jacobi PBD (method.md §3)."});
   v.field(s.substeps, {"substeps", "Substeps per frame.", between(1, 100000)});
   v.field(s.iterations, {"iterations", "K, solver iterations per substep.", between(0, 1e6)});
-  v.field(s.stiffness, {"stiffness", "k, stiffness per mass; `implicit` only, with κ = k dt (dt + τ) and s = κ / (1 + κ).",
-                        between(0, 1e15, "1/s²")});
+  v.field(s.stiffness,
+          {"stiffness", "k, stiffness per mass; `implicit` only, with κ = k dt (dt + τ) and s = κ / (1 + κ).",
+           between(0, 1e15, "1/s²")});
   v.field(s.relaxation, {"relaxation", "s; `published` only.", above(0, 1)});
   v.field(s.acceleration, {"acceleration",
                            "`chebyshev`: the same answer in fewer, slightly dearer iterations; the energy may rise in "
