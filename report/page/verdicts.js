@@ -110,7 +110,7 @@ export function cards(data, show) {
     const first = data.findings[members[0]];
     const button = (k, text) => element('button', { type: 'button', class: 'finding', 'data-finding': k, 'aria-pressed': 'false', text, onclick: () => show(k) });
     const row = data.rows.find((one) => one.property === first.property && one.stage === first.stage);
-    const text = element('p', { class: 'witness' }, ...unbroken(first.text || 'It has no witness.'));
+    const text = element('p', { class: 'witness' }, ...unbroken(`${first.text || 'It has no witness.'}${data.foreign && first.text ? '.' : ''}`));
     found.push(element('article', { class: `card ${first.expected ? 'warn' : 'bad'}` },
       element('h3', {}, nameNode(first.property, data.command), !data.foreign && element('span', { class: 'muted', text: ` after ${first.stage}` })),
       text,
