@@ -114,7 +114,7 @@ TEST(Results, OfStatesKicksAndRelationsSayWhatWasJudgedAndWhereToLook) {
                              {"particles", 6},
                              {"kicks", {{{"kick_frame", 4}, {"pieces", {{{"piece", 0}}, {{"piece", 1}}}}}}}});
   EXPECT_EQ(kick.opens, 4);
-  EXPECT_EQ(kick.pieces, "Its tissue is 2 pieces");
+  EXPECT_EQ(kick.pieces, "Its tissue is 2 pieces.");
   EXPECT_TRUE(kick.is_foreign());
   const Results relate =
       made("cutproof.relate",
