@@ -134,10 +134,10 @@ void add_verdicts(const Field& document, Results& results) {
     const auto has_none = [](const Finding& one) {
       return one.clusters.empty() && one.particles.empty() && one.path.empty() && one.triangles.empty();
     };
-    // Whatever fails with it, a ghost force says more.
+    // Of what else fails with it, a ghost force says most.
     const auto is_other = [](const Finding& one) { return one.property != "no ghost force"; };
-    return std::tuple(a.is_expected, is_other(a), a.frame, a.stage, has_none(a)) <
-           std::tuple(b.is_expected, is_other(b), b.frame, b.stage, has_none(b));
+    return std::tuple(a.is_expected, a.frame, a.stage, is_other(a), has_none(a)) <
+           std::tuple(b.is_expected, b.frame, b.stage, is_other(b), has_none(b));
   });
   if (results.findings.size() > kMostFindings) {
     results.findings_left_out += static_cast<int64_t>(results.findings.size() - kMostFindings);

@@ -41,7 +41,7 @@ enum Which : std::size_t {
 };
 
 // How much faster than any velocity at the ends of frames those in between may be, about their mean.
-constexpr double kBetween = 4;
+constexpr double kBetween = 2.5;
 
 // One whose square is none is beyond all bounds.
 bool is_number(Vec3 x) { return std::isfinite(dot(x, x)); }

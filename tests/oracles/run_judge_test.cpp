@@ -384,9 +384,9 @@ TEST(RunJudge, TellsAVibrationThatFramesDoNotResolveFromATeleport) {
   for (const double phase : {0.01, 0.3, 1.0, 2.0, 2.7, 3.1416, 4.0, 6.2832, 6.3, 9.0}) {
     EXPECT_TRUE(is_without_teleport(phase, 0)) << phase;
     const double fastest_way = 1e-3 * phase;  // peak speed times the frame
-    EXPECT_FALSE(is_without_teleport(phase, 4.01 * fastest_way)) << phase;
+    EXPECT_FALSE(is_without_teleport(phase, 2.51 * fastest_way)) << phase;
   }
-  EXPECT_TRUE(is_without_teleport(0.01, 3.99 * 1e-5));
+  EXPECT_TRUE(is_without_teleport(0.01, 2.49 * 1e-5));
 }
 
 // The witness is where the pieces are joined, and not the first particle of each.
