@@ -48,11 +48,15 @@ int check_recording(const CheckOptions& options) {
   const std::optional<Baseline> baseline =
       read_baseline(options.baseline, {"cutproof.check", "cutproof.run"}, scene.name);
 
+  harness::Promises promises;
+  promises.words =
+      harness::parse_promises(recording.promises, io::recording_paths(options.recording).index, "promises");
+
   const auto initial = std::make_shared<const State>(reader.snapshot(0).state);
   say("recording {}: scene {}, backend {}, {} snapshots of {} particles\n", options.recording,
       scene.name.empty() ? "(none)" : printable(scene.name), printable(recording.backend), recording.snapshot_count,
       recording.setup.body.particle_count());
-  harness::SceneJudge judge(recording.setup, scene.expect, recording.backend, initial, depth, {},
+  harness::SceneJudge judge(recording.setup, scene.expect, recording.backend, initial, depth, promises,
                             opened.is_cut_short ? harness::Extent::cut_short : harness::Extent::whole);
   RunResult result{"check", options.recording,    recording.backend,
                    scene,   recording.setup.body, initial->clusters.count()};

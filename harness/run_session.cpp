@@ -25,7 +25,7 @@ RunSession::RunSession(RunInput input, Observers wanted, Backend& backend, oracl
   record_ = is_passing ? io::unfinished_name(wanted_.page) : wanted_.record;
   if (record_.empty()) return;
   recorder_.emplace(record_, input_.setup, input_.scene_json, input_.backend, harness::left_to_reference(backend_),
-                    input_.cut_short_at);
+                    input_.cut_short_at, backend_.promises());
 }
 
 void RunSession::run(const std::function<void(const FrameResult&)>& on_frame, const StopAsked& stop_asked) {

@@ -73,7 +73,7 @@ auto writing(const std::string& file, const std::string& what, F&& action) {
 
 struct Recorder::File {
   File(const std::string& name, const Setup& given, const std::string& scene_json, const std::string& backend,
-       const std::array<bool, 6>& left_to_reference, std::optional<int64_t> frames_asked);
+       const std::array<bool, 6>& left_to_reference, std::optional<int64_t> frames_asked, const std::string& promises);
   void add(Stage stage, const State& state);
   void finish();
 
@@ -142,7 +142,7 @@ struct Recorder::File {
 
 Recorder::File::File(const std::string& given_name, const Setup& given, const std::string& scene_json,
                      const std::string& backend, const std::array<bool, 6>& left_to_reference,
-                     std::optional<int64_t> frames_asked)
+                     std::optional<int64_t> frames_asked, const std::string& promises)
     : name(recording_paths(given_name).index),
       setup(given),
       starts(frame_starts(given)),
@@ -158,6 +158,7 @@ Recorder::File::File(const std::string& given_name, const Setup& given, const st
   if (const std::string left = words_of_stages(left_to_reference); !left.empty()) {
     hdf5::write_text_attribute(index.id(), kLeftToReference, left);
   }
+  if (promises != "*") hdf5::write_text_attribute(index.id(), kPromises, promises);
   hdf5::write_table(index.id(), "scene", std::vector<uint8_t>(scene_json.begin(), scene_json.end()));
   hdf5::write_attribute(index.id(), "frames_asked", frames_asked.value_or(-1));
   write_setup(index.id(), setup);
@@ -321,7 +322,7 @@ void Recorder::File::finish() {
 
 Recorder::Recorder(const std::string& name, const Setup& setup, const std::string& scene_json,
                    const std::string& backend, std::array<bool, 6> left_to_reference,
-                   std::optional<int64_t> frames_asked) {
+                   std::optional<int64_t> frames_asked, const std::string& promises) {
   const std::string stem = std::filesystem::path(stem_of(name)).filename().string();
   if (stem.empty()) {
     throw InputError(name, "", "This names no file to record to.", "Give a name such as \"run1\" or \"out/run1\".");
@@ -330,7 +331,7 @@ Recorder::Recorder(const std::string& name, const Setup& setup, const std::strin
     throw std::invalid_argument("A setup to be recorded is not valid: " + defect->field + ": " + defect->problem);
   }
   file_ = writing(recording_paths(name).index, "The recording cannot be begun", [&] {
-    return std::make_unique<File>(name, setup, scene_json, backend, left_to_reference, frames_asked);
+    return std::make_unique<File>(name, setup, scene_json, backend, left_to_reference, frames_asked, promises);
   });
 }
 

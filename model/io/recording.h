@@ -39,10 +39,11 @@ class Recorder {
  public:
   // scene_json and backend are kept as they are. `left_to_reference`: as Recording has it. `frames_asked`: the run was
   // asked to stop after so many of the scene's frames, which are not all of them; nothing: it goes to the scene's end.
-  // Throws InputError if the folder is not there or not writable, before anything else is done; std::invalid_argument
-  // if the setup is not valid; MachineError if the disk fails.
+  // `promises`: as Recording has it. Throws InputError if the folder is not there or not writable, before anything else
+  // is done; std::invalid_argument if the setup is not valid; MachineError if the disk fails.
   Recorder(const std::string& name, const Setup& setup, const std::string& scene_json, const std::string& backend,
-           std::array<bool, 6> left_to_reference = {}, std::optional<int64_t> frames_asked = {});
+           std::array<bool, 6> left_to_reference = {}, std::optional<int64_t> frames_asked = {},
+           const std::string& promises = "*");
   ~Recorder();
   // The contents of a state may be anything (an oracle is to judge them), but its arrays must have the lengths of the
   // setup and of each other: std::invalid_argument otherwise. Throws MachineError if the disk fails, is full, …; the
@@ -62,6 +63,7 @@ struct Recording {
   std::string scene_json;
   std::string backend;
   std::array<bool, 6> left_to_reference = {};  // by stage: the backend cannot run it, the reference did
+  std::string promises = "*";                  // words of harness/promises.h with blanks between them; "*": all
   Precision precision = Precision::binary64;   // of all states
   int64_t snapshot_count = 0;
   std::optional<int64_t> frames_asked;  // as the recorder was told

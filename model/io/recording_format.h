@@ -88,6 +88,8 @@ inline constexpr const char* kLeftToReference = "left_to_reference";
 std::string words_of_stages(const std::array<bool, 6>& stages);
 // Throws hdf5::Error for a word that is no stage.
 std::array<bool, 6> stages_of_words(const std::string& words);
+// The root attribute of what the backend promises, as words with blanks between them; absent: everything.
+inline constexpr const char* kPromises = "promises";
 // The root attribute that says 1 where places were kept as absolute coordinates, so that State::place_rounding is not
 // 0.
 inline constexpr const char* kAbsoluteCoordinates = "absolute_coordinates";

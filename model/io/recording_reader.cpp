@@ -223,6 +223,7 @@ void RecordingReader::File::read_index(const ReadingArchive& root) {
     root(kLeftToReference, left);
     header.left_to_reference = stages_of_words(left);
   }
+  if (hdf5::has_attribute(index.file.id(), kPromises)) root(kPromises, header.promises);
   std::vector<uint8_t> scene;
   root("scene", scene);
   header.scene_json.assign(scene.begin(), scene.end());

@@ -329,6 +329,12 @@ class Runs(Simulated):
                 status, document, text = self.check(path)
                 self.assertEqual(status, 1, text)
                 self.assertIn("linear momentum", self.failed(document))
+                # A recording may promise less.
+                with h5py.File(f"{path}.cutproof.h5", "r+") as index:
+                    index.attrs["promises"] = "connected covered"
+                status, document, text = self.check(path)
+                self.assertNotIn("linear momentum", self.failed(document))
+                self.assertTrue(any("'linear momentum' is not promised" in note for note in document["notes"]), text)
 
     def test_forms_of_a_file_have_the_same_verdicts(self):
         told = []
