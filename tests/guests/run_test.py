@@ -331,7 +331,7 @@ class Runs(Simulated):
                 self.assertIn("linear momentum", self.failed(document))
                 # A recording may promise less.
                 with h5py.File(f"{path}.cutproof.h5", "r+") as index:
-                    index.attrs["promises"] = "connected covered"
+                    index.attrs["promises"] = numpy.bytes_("connected covered")
                 status, document, text = self.check(path)
                 self.assertNotIn("linear momentum", self.failed(document))
                 self.assertTrue(any("'linear momentum' is not promised" in note for note in document["notes"]), text)
