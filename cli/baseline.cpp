@@ -208,12 +208,11 @@ void add_baseline_to(ForGitHub& said, const SinceBaseline& since) {
 void print_since(const SinceBaseline& since) {
   say("\n");
   if (!since.fresh.empty()) insist("{}: {}\n", failing("new since the baseline"), fmt::join(since.fresh, ", "));
-  if (!since.known.empty()) insist("{}: {}\n", inconclusive("fails as in the baseline"), in_words(since.known));
+  if (!since.known.empty()) insist("{}: {}\n", unsettled("fails as in the baseline"), in_words(since.known));
   if (!since.mended.empty()) say("{}: {}\n", holding("mended since the baseline"), fmt::join(since.mended, ", "));
   if (!since.not_judged.empty())
-    say("{}: {}\n", inconclusive("failed in the baseline, and was not judged as far"),
-        fmt::join(since.not_judged, ", "));
-  if (!since.slower.empty()) say("{}: {}\n", inconclusive("slower than in the baseline"), in_words(since.slower));
+    say("{}: {}\n", unsettled("failed in the baseline, and was not judged as far"), fmt::join(since.not_judged, ", "));
+  if (!since.slower.empty()) say("{}: {}\n", unsettled("slower than in the baseline"), in_words(since.slower));
   insist("beside {}: {}\n", since.file,
          since.fresh.empty() ? holding("nothing new fails.") : failing("something new fails."));
 }

@@ -94,7 +94,7 @@ void show_judged(const std::vector<Verdict>& verdicts, const std::vector<harness
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - reports.begun;
   write_junit(reports.junit, judging, seconds.count(), std::move(cases), properties);
   print_verdicts(verdicts, shown);
-  print_grouped(inconclusive("Not judged"), others);
+  print_grouped(unsettled("Not judged"), others);
   print_notes(notes);
   print_written(reports.json);
   print_written(reports.page);

@@ -117,7 +117,7 @@ void print_coverage(const json& document) {
     say("all {} coverage classes were met, the rarest in {} cases: {}\n", classes, least, rarest);
   } else {
     say("{} of {} coverage classes were met; {}: {}\n", classes - static_cast<int64_t>(empty.size()), classes,
-        inconclusive("not met"), fmt::join(empty, ", "));
+        unsettled("not met"), fmt::join(empty, ", "));
   }
 }
 
@@ -152,7 +152,7 @@ void print_properties(const json& properties) {
     }
     say("\n");
   }
-  if (doubtful > 0) say("{}: {} things\n", inconclusive("inconclusive within rounding"), io::grouped(doubtful));
+  if (doubtful > 0) say("{}: {} things\n", unsettled("inconclusive within rounding"), io::grouped(doubtful));
 }
 
 }  // namespace
@@ -167,10 +167,10 @@ void print_campaign(const json& document) {
         document.at("steps_compared"));
   }
   if (const std::vector<std::string> left = document.at("left_to_reference"); !left.empty()) {
-    say("{}\n", inconclusive(printable(left_in_words(left))));
+    say("{}\n", unsettled(printable(left_in_words(left))));
   }
   if (document.at("refused") > 0) {
-    say("{}\n", inconclusive(io::filled("{refused} cases were refused: nothing is known of them", document)));
+    say("{}\n", unsettled(io::filled("{refused} cases were refused: nothing is known of them", document)));
   }
   const auto grouped = [&](const char* name) { return io::grouped(document.at(name).get<int64_t>()); };
   say("{} cases of {:.0f} particles on average, {} verdicts, {:.1f} s, {} cases/s\n", grouped("cases"),
@@ -187,7 +187,7 @@ int print_conclusion(const json& document, const CampaignConclusion& conclusion)
   } else {
     const bool only_stopped =
         !document.at("complete") && !document.contains("missing_shards") && document.at("violations").empty();
-    insist("{}: {}\n", only_stopped ? inconclusive("INCOMPLETE") : failing("FAILS"), conclusion.failure);
+    insist("{}: {}\n", only_stopped ? unsettled("INCOMPLETE") : failing("FAILS"), conclusion.failure);
   }
   return conclusion.holds() ? 0 : 1;
 }

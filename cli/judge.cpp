@@ -152,15 +152,15 @@ void print_properties(const KernelCampaign& campaign) {
   if (campaign.operation->is_simulator()) print_scenes(campaign);
   print_kinds(campaign);
   for (const Unpromised& u : campaign.unpromised) {
-    say("  {}: {}{}\n", inconclusive("not promised, not judged"), u.property,
+    say("  {}: {}{}\n", unsettled("not promised, not judged"), u.property,
         u.failing > 0 ? fmt::format(" (would fail in {} questions)", u.failing) : "");
   }
   for (const NotAsked& each : campaign.not_asked) {
-    say("  {}: {} of size {}: that of size {} took {:.2g} s, and --time-limit may be reached\n",
-        inconclusive("not asked"), each.kind, each.size, each.size_before, each.seconds);
+    say("  {}: {} of size {}: that of size {} took {:.2g} s, and --time-limit may be reached\n", unsettled("not asked"),
+        each.kind, each.size, each.size_before, each.seconds);
   }
   if (campaign.refused > 0) {
-    say("  {}: {} questions, without a verdict\n", inconclusive("refused"), campaign.refused);
+    say("  {}: {} questions, without a verdict\n", unsettled("refused"), campaign.refused);
   }
   if (const std::string why = campaign.untested(); !why.empty()) {
     insist("{}: too little was judged: {}\n", failing("FAILS"), why);
@@ -424,7 +424,7 @@ int judge(JudgeOptions options) {
     const std::size_t all = asked.size() + (on_stages ? 1 : 0);
     const std::string how_far =
         fmt::format("it was stopped after {} of {} begun", begun, counted(all, "operation was", "operations were"));
-    insist("{}: {}\n", inconclusive("INCOMPLETE"), how_far);
+    insist("{}: {}\n", unsettled("INCOMPLETE"), how_far);
     io::JunitCase& stopped = junit.emplace_back(io::JunitCase{kEnoughJudged, kClass});
     stopped.outcome = io::JunitOutcome::error;
     stopped.message = how_far;

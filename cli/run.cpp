@@ -278,7 +278,7 @@ void conclude_run(const RunSession& session, const std::string& again) {
     return;
   }
   const std::vector<std::string> left = session.left_to_reference();
-  if (!left.empty()) say("{}\n", inconclusive(left_in_words(left)));
+  if (!left.empty()) say("{}\n", unsettled(left_in_words(left)));
   std::vector<Verdict> all = session.against()->verdicts();
   all.insert(all.end(), session.broken_contracts().begin(), session.broken_contracts().end());
   print_conclusion(all, of_the_run, "what was compared holds.");
@@ -411,7 +411,7 @@ int run(const RunOptions& options) {
   print_written(options.report);
   conclude_run(session, options.again);
   if (since != nullptr) print_since(*since);
-  if (!stopped.empty()) insist("{}: {}\n", inconclusive("INCOMPLETE"), stopped);
+  if (!stopped.empty()) insist("{}: {}\n", unsettled("INCOMPLETE"), stopped);
   tell_github_of_run(session, judging, stopped, since);
   return session.holds() || (since != nullptr && since->excuses() && stopped.empty()) ? 0 : 1;
 }

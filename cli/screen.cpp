@@ -138,7 +138,7 @@ void print_error(std::initializer_list<std::string_view> pieces) noexcept {
 
 std::string failing(const std::string& text) { return in_colour("31", text); }
 std::string holding(const std::string& text) { return in_colour("32", text); }
-std::string inconclusive(const std::string& text) { return in_colour("33", text); }
+std::string unsettled(const std::string& text) { return in_colour("33", text); }
 std::string lesser(const std::string& text) { return in_colour("2", text); }
 
 }  // namespace cutproof::cli

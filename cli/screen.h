@@ -62,9 +62,9 @@ void end_line();
 void print_error(std::initializer_list<std::string_view> pieces) noexcept;
 
 // Colours, never the only carrier of a meaning.
-std::string failing(const std::string& text);       // red
-std::string holding(const std::string& text);       // green
-std::string inconclusive(const std::string& text);  // yellow: not promised, or inconclusive
-std::string lesser(const std::string& text);        // dim: less important
+std::string failing(const std::string& text);    // red
+std::string holding(const std::string& text);    // green
+std::string unsettled(const std::string& text);  // yellow: neither holds nor fails
+std::string lesser(const std::string& text);     // dim: less important
 
 }  // namespace cutproof::cli

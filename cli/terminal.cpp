@@ -219,9 +219,9 @@ void print_the_rest(const std::vector<Row>& rows, const Shown& shown) {
       vacuous.emplace_back(row.any->property, row.vacuous.empty() ? "no reason given" : row.vacuous);
     }
   }
-  if (!expected.empty()) say("{}: {}.\n", inconclusive("Fails, as the scene expects"), listed(expected));
+  if (!expected.empty()) say("{}: {}.\n", unsettled("Fails, as the scene expects"), listed(expected));
   print_grouped(lesser("Nothing to look at"), vacuous);
-  if (!unsure.empty()) say("{}: {}.\n", inconclusive("Inconclusive within rounding"), listed(unsure));
+  if (!unsure.empty()) say("{}: {}.\n", unsettled("Inconclusive within rounding"), listed(unsure));
 }
 
 void print_conclusion(std::size_t verdicts, int64_t failed, bool all, const char* holds) {
@@ -256,13 +256,13 @@ void print_verdicts(const std::vector<Verdict>& verdicts, const Shown& shown) {
 void print_verdicts(const harness::SceneJudge& judge, const std::string& again) {
   print_verdicts(judge.verdicts(), shown_of(judge, again));
   if (!judge.not_reached().empty()) {
-    say("{}: {}.\n", inconclusive("Not reached, because the run stops before"), listed(judge.not_reached()));
+    say("{}: {}.\n", unsettled("Not reached, because the run stops before"), listed(judge.not_reached()));
   }
   if (const std::vector<std::string> left = judge.left_to_reference(); !left.empty()) {
-    say("{}\n", inconclusive(left_in_words(left)));
+    say("{}\n", unsettled(left_in_words(left)));
   }
   if (!judge.not_its_own().empty()) {
-    say("{}: {}.\n", inconclusive("Not judged, because only such stages decide it"), listed(judge.not_its_own()));
+    say("{}: {}.\n", unsettled("Not judged, because only such stages decide it"), listed(judge.not_its_own()));
   }
   std::vector<std::string> unpromised;
   for (const harness::Judge::Unpromised& u : judge.unpromised()) {
@@ -270,7 +270,7 @@ void print_verdicts(const harness::SceneJudge& judge, const std::string& again) 
                                                      io::grouped(u.failing), io::grouped(u.states))
                                        : u.property);
   }
-  if (!unpromised.empty()) say("{}: {}.\n", inconclusive("Not promised here, so not judged"), listed(unpromised));
+  if (!unpromised.empty()) say("{}: {}.\n", unsettled("Not promised here, so not judged"), listed(unpromised));
   print_notes(judge.notes_beside_lists());
 }
 

@@ -246,7 +246,7 @@ void print(const TuneOptions& options, TuneStep step, const json& document, cons
         print_trials(trials);
         print_front(document);
       }
-      insist("\n{}: it was stopped {}; nothing is found yet\n", inconclusive("INCOMPLETE"),
+      insist("\n{}: it was stopped {}; nothing is found yet\n", unsettled("INCOMPLETE"),
              trials.empty() ? std::string("before the first configuration was tried")
                             : fmt::format("after {} configuration{}", trials.size(), trials.size() == 1 ? "" : "s"));
     }

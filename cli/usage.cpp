@@ -35,9 +35,8 @@ std::string_view letters_of(std::string_view option) {
   return option.substr(std::min(option.find_first_not_of('-'), option.size()));
 }
 
-// Words that people may try, and the field's word.
-constexpr std::pair<std::string_view, std::string_view> kOtherWords[] = {{"simplify", "shrink"},
-                                                                         {"minimize", "shrink"}};
+// Words that options do not have, and the field's word.
+constexpr std::pair<std::string_view, std::string_view> kOtherWords[] = {{"simplify", "shrink"}};
 
 std::string option_meant(const std::string& given, const std::vector<std::string>& names) {
   std::vector<std::string_view> letters;

@@ -87,7 +87,7 @@ void print(const Vectors& vectors, const VectorReport& report, const std::string
   if (!printed.empty()) insist_copy("see it again:", again);
   print_judged(report.properties, &harness::PropertySummary::judged);
   for (const NotJudged& each : report.not_judged) {
-    say("  {}: {}: {}{}\n", inconclusive("not judged"), each.property, each.why,
+    say("  {}: {}: {}{}\n", unsettled("not judged"), each.property, each.why,
         each.failing > 0 ? fmt::format(" (would fail in {} cases)", each.failing) : "");
   }
   if (report.verdicts == 0) insist("{}: nothing was judged\n", failing("FAILS"));

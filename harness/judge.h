@@ -46,6 +46,7 @@ class Judge {
   const std::vector<Unpromised>& unpromised() const { return unpromised_; }
   bool has_expanded() const { return has_expanded_; }
   int64_t frame() const { return frame_; }  // in progress
+  bool is_lost() const { return lost_; }    // the last state is not well formed, or of another frame
 
   // For reports: counts of the last state seen, from known results; 0 if that state is not well formed.
   int32_t component_count();

@@ -54,7 +54,7 @@ double plausible_spacing(const Body& body) {
     for (const int32_t other : body.neighbours(i)) add(body.rest_length(i, other));
   }
   if (lengths.empty()) {
-    // Of some particles how far the nearest other one is.
+    // The distance to the nearest particle, of some particles.
     constexpr int32_t kSome = 64;
     for (int32_t i = 0; i < body.particle_count(); i += body.particle_count() / kSome + 1) {
       double nearest = std::numeric_limits<double>::infinity();

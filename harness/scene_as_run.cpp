@@ -13,7 +13,7 @@ SceneAsRun::SceneAsRun(const Setup& setup, const State& initial)
 }
 
 void SceneAsRun::see(const State& state) {
-  const RunSegment segment(segments_.next(state), "", seen_++);
+  const RunSegment segment(segments_.next(state), "", frame_++);
   if (!judge_) {
     judge_.emplace(segment.header());
     judge_->weigh(segment.mass());
@@ -25,8 +25,7 @@ void SceneAsRun::see(const State& state) {
 std::vector<Verdict> SceneAsRun::verdicts() {
   judge_->finish();
   std::vector<Verdict> all = judge_->verdicts();
-  // The judge counts the state as loaded as a frame, too.
-  for (Verdict& verdict : all) verdict.frame = std::max<int64_t>(verdict.frame - 1, 0);
+  for (Verdict& verdict : all) verdict.frame = std::max<int64_t>(verdict.frame, 0);
   return all;
 }
 

@@ -22,7 +22,7 @@ class SceneAsRun {
  private:
   io::StateSegments segments_;
   std::optional<oracles::RunJudge> judge_;
-  int64_t seen_ = 0;
+  int64_t frame_ = -1;  // of the scene; the state as loaded comes before its frame 0
 };
 
 }  // namespace cutproof::harness

@@ -17,7 +17,7 @@ SceneJudge::SceneJudge(const Setup& setup, const Expectations& expectations, std
       judge_(setup, std::move(backend), promises, Thorough::when_cut, depth),
       expectations_(setup, expectations, initial, extent) {
   judge_.begin(initial);
-  const bool any = setup.body.particle_count() > 0 && oracles::well_formed(setup, *initial).holds;
+  const bool any = setup.body.particle_count() > 0 && !judge_.is_lost();
   if (any && depth == Depth::motion) as_run_.emplace(setup, *initial);
 }
 
@@ -26,7 +26,7 @@ void SceneJudge::see(const Moment& moment) {
   judge_.see(moment);
   expectations_.see(moment);
   if (!as_run_) return;
-  if (!moment.by_backend || !oracles::well_formed(setup_, *moment.after).holds) {
+  if (!moment.by_backend || judge_.is_lost()) {
     as_run_.reset();
   } else if (moment.span.contains(Stage::skin)) {
     as_run_->see(*moment.after);
@@ -44,6 +44,7 @@ void SceneJudge::finish() {
     // Of each step *motion* asks what *no teleport* asks of a frame.
     std::set<std::string> asked = {"run well formed", "no teleport"};
     for (const Verdict& verdict : judge_.verdicts()) asked.insert(verdict.property);
+    for (const Judge::Unpromised& one : judge_.unpromised()) asked.insert(one.property);
     for (Verdict& verdict : as_run_->verdicts()) {
       if (!asked.contains(verdict.property)) judge_.add(std::move(verdict));
     }

@@ -1,4 +1,4 @@
-// What random cases must have met to say anything, by name. For campaigns, and for pages about them.
+// Coverage classes of random cases, by name: a campaign without them says too little. For campaigns and their pages.
 #pragma once
 #include <array>
 
@@ -13,7 +13,7 @@ struct CoverageClass {
   Occurs occurs = Occurs::always;
 };
 
-// What happened in a case.
+// Coverage classes of a case.
 inline constexpr std::array kCoverageClasses = {
     CoverageClass{"no particles"},
     CoverageClass{"one particle"},

@@ -51,7 +51,7 @@ int print_how_far(const std::string& path, const std::string& report, const nloh
                   const Suite& suite) {
   const std::size_t rows = document.at(suite.rows).size();
   if (rows > 0) suite.end(document);
-  insist("\n{}: it was stopped after {} row{}\n", inconclusive("INCOMPLETE"), rows, rows == 1 ? "" : "s");
+  insist("\n{}: it was stopped after {} row{}\n", unsettled("INCOMPLETE"), rows, rows == 1 ? "" : "s");
   write_document(path, document);
   write_document_report(report, document, made_by(document.value("again", std::string())));
   print_written(path);

@@ -46,7 +46,7 @@ constexpr double kBetween = 2.5;
 // One whose square is none is beyond all bounds.
 bool is_number(Vec3 x) { return std::isfinite(dot(x, x)); }
 
-// Of a vector of length `was` that is `is` long now, and is off by `off` from what it was.
+// The change of a vector from length `was` to length `is`; `off`: the length of the difference.
 std::string change_in_words(double was, double is, double off) {
   if (!(was > 0)) return "angular momentum appears";
   const double lost = was - is;
@@ -84,8 +84,6 @@ constexpr RunProperty kRunProperties[kProperties] = {
     {"mass kept", "kg", kSource, "mass that is given anew"},
 };
 
-}  // namespace
-
 // The most particles that share a coordinate.
 int64_t largest_plane(std::span<const Vec3> places) {
   std::ptrdiff_t most = 1;
@@ -103,6 +101,8 @@ int64_t largest_plane(std::span<const Vec3> places) {
   }
   return most;
 }
+
+}  // namespace
 
 class RunJudge::Implementation {
  public:
@@ -488,8 +488,8 @@ class RunJudge::Implementation {
              i, off, frame_, between);
     }
   }
-  // By what share of itself a velocity may be behind the way that it has made: schemes damp it by exp(c dt / S), or by
-  // 1 - c dt / S while that is positive, once the particle has moved.
+  // The greatest share by which a velocity at the end of a frame is less than the velocity of the way. A scheme moves
+  // particles first, and then damps velocities by exp(-c dt / S), or by 1 - c dt / S while that is positive.
   double lag(double dt) const {
     const double decay = header_.damping * dt / static_cast<double>(header_.steps);
     return std::max(std::expm1(decay), decay < 1 ? decay / (1 - decay) : 0);
@@ -540,8 +540,8 @@ class RunJudge::Implementation {
     const Vec3 p = p_sum, p_was = p_was_sum, x = x_sum, x_was = x_was_sum;
     const auto mass = static_cast<double>(mass_sum);
     const double steps = static_cast<double>(header_.steps), decay = header_.damping * dt;
-    // What a group rounds once, as the translation of a cluster, moves all of its particles alike; and particles of a
-    // grid that move alike have equal coordinates, which round alike.
+    // One rounding of a group, as of a cluster's translation, moves all its particles alike. Equal coordinates round
+    // alike, as those of a grid that moves without turning.
     const auto alike = static_cast<double>(std::max(largest_group_, largest_plane_));
     const double rounding = kDeviations * header_.u * std::sqrt(steps * alike * squares);
     // A scheme damps by (1 - c dt / S)^S, its inverse, or between: (c dt)² off the exponential at most, and what is
