@@ -322,6 +322,7 @@ cutproof_frames run() {
   r.cell_count = call.shown("run/cell_count");
   r.tetrahedra = call.shown("run/tetrahedra");
   r.hexahedra = call.shown("run/hexahedra");
+  r.seconds = call.shown("run/seconds");
   return r;
 }
 

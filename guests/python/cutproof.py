@@ -225,7 +225,7 @@ def _clusters_of(value):
 _OF_FRAME = {"positions": ("position", "n3"), "velocities": ("velocity", "n3"), "spin": ("spin", "n3"),
              "mass": ("mass", "n"), "alive": ("alive", "n"), "parent": ("parent", "n"),
              "contact_impulse": ("contact_impulse", "3"), "energy": ("energy", ""), "steps": ("steps", ""),
-             "damping": ("damping", "")}
+             "damping": ("damping", ""), "seconds": ("seconds", "")}
 _IGNORED = {"time", "blade", "removed"}  # what cutproof_run.Writer.frame takes too; `removed` says who is not alive
 _WHOLE = {"parent": numpy.int32, "alive": numpy.uint8, "steps": numpy.int64}
 

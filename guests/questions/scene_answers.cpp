@@ -56,7 +56,7 @@ RunFiles run_files(const Question& question, const Arrays& answers, Precision pr
   }
   for (const auto& [names, rows] :
        {std::pair{std::vector<std::string>{"velocity", "spin", "mass", "alive", "parent"}, first.back()},
-        {{"contact_impulse", "energy"}, scene.frames},
+        {{"contact_impulse", "energy", "seconds"}, scene.frames},
         {{"steps", "damping"}, int64_t{1}}}) {
     for (const std::string& name : names) {
       const Array& array = answer(name);

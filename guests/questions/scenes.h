@@ -93,7 +93,8 @@ inline constexpr AnswerArray kRunAnswers[] = {
     {.name = "run/weights", .real = true, .text = "of each member"},
     {.name = "run/cell_count", .type = ElementType::i32, .text = "[frames] cells, or -1: as before"},
     {.name = "run/tetrahedra", .type = ElementType::i32, .columns = 4, .text = "corners"},
-    {.name = "run/hexahedra", .type = ElementType::i32, .columns = 8, .text = "corners, in VTK's order"}};
+    {.name = "run/hexahedra", .type = ElementType::i32, .columns = 8, .text = "corners, in VTK's order"},
+    {.name = "run/seconds", .real = true, .text = "[frames] what the way to each frame took to compute"}};
 
 // As files of arrays, one for each frame; or why that cannot be.
 struct RunFiles {

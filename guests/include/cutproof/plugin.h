@@ -81,6 +81,7 @@ typedef struct cutproof_frames { /* docs/reference/run.md; p: particles of all f
   cutproof_array* group_count;                         /* i32 [frames] coupling groups; -1: as in the frame before */
   cutproof_array *offsets, *members, *weights;         /* of all that are given: i64 [groups + 1], i32, real */
   cutproof_array *cell_count, *tetrahedra, *hexahedra; /* i32 [frames], -1 likewise; i32 [.. x 4] or [.. x 8] */
+  cutproof_array* seconds;                             /* real [frames] what the way to each frame took to compute */
 } cutproof_frames;
 
 typedef struct cutproof_host {

@@ -1,0 +1,173 @@
+// Kernels as functions of an index, for a CUDA device and, by the same source, for the host.
+//
+// An executor (Host, or Device where nvcc compiles) has memory and these operations; a simulator is a template over it.
+//   for_each(n, f)        calls f(i) for i in 0 .. n - 1, in any order or at once: f must not depend on what another
+//                         call writes. f is a lambda [=] BASELINES_KERNEL(int64_t i), over pointers.
+//   sort(keys, values)    ascending; equal keys keep their order
+//   scan(counts, starts)  starts[i] = counts[0] + .. + counts[i - 1]; starts has one entry more
+//   sums(values, starts, out)  out[s] = values[starts[s]] + .. + values[starts[s + 1] - 1], in an order that depends on
+//                         that segment alone
+// Sums, and so all results of a simulator without atomics, have the same bits in every run.
+#pragma once
+#include <algorithm>
+#include <cstdint>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#ifdef __CUDACC__
+#include <cub/cub.cuh>
+#define BASELINES_HOST_DEVICE __host__ __device__
+#else
+#define BASELINES_HOST_DEVICE
+#endif
+#define BASELINES_KERNEL BASELINES_HOST_DEVICE
+
+namespace cutproof::baselines {
+
+class Host {
+ public:
+  template <class T>
+  class Array {
+   public:
+    explicit Array(std::size_t size = 0) : values_(size) {}
+    explicit Array(const std::vector<T>& values) : values_(values) {}
+    T* data() { return values_.data(); }
+    const T* data() const { return values_.data(); }
+    std::size_t size() const { return values_.size(); }
+    std::vector<T> copy() const { return values_; }  // to the host
+
+   private:
+    std::vector<T> values_;
+  };
+
+  template <class F>
+  void for_each(std::size_t n, F f) {
+    for (std::size_t i = 0; i < n; ++i) f(static_cast<int64_t>(i));
+  }
+  void sort(Array<uint32_t>& keys, Array<int32_t>& values) {
+    std::vector<int32_t> order(keys.size());
+    std::iota(order.begin(), order.end(), 0);
+    std::stable_sort(order.begin(), order.end(), [&](int32_t a, int32_t b) { return keys.data()[a] < keys.data()[b]; });
+    const std::vector<uint32_t> old_keys = keys.copy();
+    const std::vector<int32_t> old_values = values.copy();
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      keys.data()[i] = old_keys[static_cast<std::size_t>(order[i])];
+      values.data()[i] = old_values[static_cast<std::size_t>(order[i])];
+    }
+  }
+  void scan(const Array<int32_t>& counts, Array<int32_t>& starts) {
+    starts.data()[0] = 0;
+    for (std::size_t i = 0; i < counts.size(); ++i) starts.data()[i + 1] = starts.data()[i] + counts.data()[i];
+  }
+  template <class T>
+  void sums(const Array<T>& values, const Array<int32_t>& starts, Array<T>& out) {
+    for (std::size_t s = 0; s + 1 < starts.size(); ++s) {
+      out.data()[s] = std::accumulate(values.data() + starts.data()[s], values.data() + starts.data()[s + 1], T{});
+    }
+  }
+  void finish() {}
+};
+
+#ifdef __CUDACC__
+
+inline void check(cudaError_t error) {
+  if (error == cudaErrorMemoryAllocation) {
+    cudaGetLastError();  // it is no error of the next call
+    throw std::bad_alloc();
+  }
+  if (error != cudaSuccess) throw std::runtime_error(cudaGetErrorString(error));
+}
+
+template <class F>
+__global__ void each(int64_t n, F f) {
+  const int64_t i = int64_t{blockIdx.x} * blockDim.x + threadIdx.x;
+  if (i < n) f(i);
+}
+
+class Device {
+ public:
+  template <class T>
+  class Array {
+   public:
+    // Without initial values it begins as zeros, as on the host.
+    explicit Array(std::size_t size = 0) : size_(size) {
+      if (size_ == 0) return;
+      check(cudaMalloc(&data_, size_ * sizeof(T)));
+      check(cudaMemset(data_, 0, size_ * sizeof(T)));
+    }
+    explicit Array(const std::vector<T>& values) : Array(values.size()) {
+      if (size_ > 0) check(cudaMemcpy(data_, values.data(), size_ * sizeof(T), cudaMemcpyHostToDevice));
+    }
+    Array(Array&& other) noexcept : data_(other.data_), size_(other.size_) { other.data_ = nullptr, other.size_ = 0; }
+    Array& operator=(Array&& other) noexcept {
+      std::swap(data_, other.data_);
+      std::swap(size_, other.size_);
+      return *this;
+    }
+    ~Array() { cudaFree(data_); }
+    T* data() { return data_; }
+    const T* data() const { return data_; }
+    std::size_t size() const { return size_; }
+    std::vector<T> copy() const {
+      std::vector<T> values(size_);
+      if (size_ > 0) check(cudaMemcpy(values.data(), data_, size_ * sizeof(T), cudaMemcpyDeviceToHost));
+      return values;
+    }
+
+   private:
+    T* data_ = nullptr;
+    std::size_t size_ = 0;
+  };
+
+  // Throws std::runtime_error where there is no device.
+  Device() { check(cudaFree(nullptr)); }
+
+  template <class F>
+  void for_each(std::size_t n, F f) {
+    if (n == 0) return;
+    constexpr unsigned kThreads = 256;
+    each<<<static_cast<unsigned>((n + kThreads - 1) / kThreads), kThreads>>>(static_cast<int64_t>(n), f);
+    check(cudaGetLastError());
+  }
+  void sort(Array<uint32_t>& keys, Array<int32_t>& values) {
+    Array<uint32_t> sorted_keys(keys.size());
+    Array<int32_t> sorted_values(values.size());
+    with_room([&](void* room, std::size_t& bytes) {
+      return cub::DeviceRadixSort::SortPairs(room, bytes, keys.data(), sorted_keys.data(), values.data(),
+                                             sorted_values.data(), static_cast<int>(keys.size()));
+    });
+    keys = std::move(sorted_keys);
+    values = std::move(sorted_values);
+  }
+  void scan(const Array<int32_t>& counts, Array<int32_t>& starts) {
+    check(cudaMemset(starts.data(), 0, sizeof(int32_t)));
+    with_room([&](void* room, std::size_t& bytes) {
+      return cub::DeviceScan::InclusiveSum(room, bytes, counts.data(), starts.data() + 1,
+                                           static_cast<int>(counts.size()));
+    });
+  }
+  template <class T>
+  void sums(const Array<T>& values, const Array<int32_t>& starts, Array<T>& out) {
+    with_room([&](void* room, std::size_t& bytes) {
+      return cub::DeviceSegmentedReduce::Sum(room, bytes, values.data(), out.data(),
+                                             static_cast<int>(starts.size() - 1), starts.data(), starts.data() + 1);
+    });
+  }
+  void finish() { check(cudaDeviceSynchronize()); }
+
+ private:
+  template <class F>
+  void with_room(F call) {
+    std::size_t bytes = 0;
+    check(call(nullptr, bytes));
+    if (room_.size() < bytes) room_ = Array<unsigned char>(bytes);
+    check(call(room_.data(), bytes));
+  }
+  Array<unsigned char> room_{1};
+};
+
+#endif
+
+}  // namespace cutproof::baselines
