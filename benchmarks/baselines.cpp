@@ -97,6 +97,26 @@ void delete_from_clusters(const Setup& setup, Deletion deletion, State& state) {
   state.skin = {};
 }
 
+double run_frame(Backend& backend, const Baseline& baseline, const Setup& setup) {
+  double seconds = 0;
+  const auto run = [&](Span span) {
+    backend.run(span);
+    seconds += backend.report().total_seconds;
+  };
+  if (baseline.deletion == Deletion::none) {
+    run(kWholeFrame);
+    return seconds;
+  }
+  run({Stage::step, Stage::detect});
+  State state = std::move(backend.snapshot().front());
+  if (!state.removed.empty()) {
+    delete_from_clusters(setup, baseline.deletion, state);
+    backend.load({setup}, {state});
+  }
+  run({Stage::skin, Stage::skin});
+  return seconds;
+}
+
 nlohmann::json run_baseline(Backend& backend, const Baseline& baseline, const ReadyScene& scene) {
   backend.load({scene.setup}, {scene.state});
   const State start = std::move(backend.snapshot().front());
@@ -111,23 +131,7 @@ nlohmann::json run_baseline(Backend& backend, const Baseline& baseline, const Re
   for (int64_t frame = 0; frame < frames; ++frame) {
     const bool is_swept = sweep.wants(state.frame);
     const State before = is_swept ? state : State{};
-    double spent = 0;
-    const auto run = [&](Span span) {
-      backend.run(span);
-      spent += backend.report().total_seconds;
-    };
-    if (baseline.deletion == Deletion::none) {
-      run(kWholeFrame);
-    } else {
-      run({Stage::step, Stage::detect});
-      state = std::move(backend.snapshot().front());
-      if (!state.removed.empty()) {
-        delete_from_clusters(scene.setup, baseline.deletion, state);
-        backend.load({scene.setup}, {state});
-      }
-      run({Stage::skin, Stage::skin});
-    }
-    seconds.push_back(spent);
+    seconds.push_back(run_frame(backend, baseline, scene.setup));
     state = std::move(backend.snapshot().front());
     if (is_swept) sweep.add(before, state);
     removed += state.removed.size() + state.debris.size();

@@ -38,8 +38,10 @@ ReadyScene make_baseline_scene(const Baseline& baseline, int64_t particles, uint
 // to state.removed. The skin is dropped, so that the next skin stage makes it anew. Requires a state after detection.
 void delete_from_clusters(const Setup& setup, Deletion deletion, State& state);
 
-// Its row of the document (docs/reference/schemas/bench_baselines.json). Seconds with a deletion: of step, detect and
-// skin.
+// One frame of what the backend has loaded. Returns its seconds [s]; with a deletion, of step, detect and skin.
+double run_frame(Backend& backend, const Baseline& baseline, const Setup& setup);
+
+// Its row of the document (docs/reference/schemas/bench_baselines.json).
 nlohmann::json run_baseline(Backend& backend, const Baseline& baseline, const ReadyScene& scene);
 
 }  // namespace cutproof::benchmarks

@@ -1,10 +1,49 @@
 #include "benchmarks/baselines.h"
 
 #include <memory>
+#include <optional>
 
+#include "benchmarks/methods.h"
 #include "benchmarks/suites/suites.h"
 
 namespace cutproof::benchmarks {
+
+namespace {
+
+// Table 3: every method on every kidney.
+void add_methods(const BaselinesOptions& options, Report& report, const Progress& progress) {
+  std::vector<std::unique_ptr<Method>> methods;
+  for (const int32_t iterations : options.iterations) {
+    methods.push_back(make_own_method(options.backend, baselines().front(), iterations));
+  }
+  // Rules that are this method's otherwise: with the most iterations.
+  for (const Baseline& baseline : baselines()) {
+    const bool is_ours = &baseline == &baselines().front();
+    const bool is_about_removal = baseline.deletion != Deletion::none || baseline.remove != RemovedEnds::both;
+    if (!is_ours && is_about_removal) {
+      methods.push_back(make_own_method(options.backend, baseline, options.iterations.back()));
+    }
+  }
+  for (const std::string& plugin : options.with) methods.push_back(make_plugin_method(plugin));
+  std::optional<ConvergedKidney> truth;
+  if (!options.truth.empty()) {
+    const std::unique_ptr<Method> method = make_plugin_method(options.truth);
+    truth.emplace(*method, options.truth_particles, options.youngs_modulus);
+    report.document["truth"] = {
+        {"name", method->name()}, {"settings", method->settings()}, {"particles", truth->particles()}};
+  }
+  report.document["youngs_modulus"] = options.youngs_modulus;
+  report.document["methods"] = nlohmann::json::array();
+  for (const int64_t size : options.sizes) {
+    const Kidney kidney = make_kidney(size, options.youngs_modulus);
+    for (const std::unique_ptr<Method>& method : methods) {
+      report.document["methods"].push_back(row_of(*method, kidney, truth ? &*truth : nullptr, options.kicks));
+      progress(report.document);
+    }
+  }
+}
+
+}  // namespace
 
 nlohmann::json run_baselines(const BaselinesOptions& options, const Progress& progress) {
   require_timed_backend(options.backend);
@@ -25,6 +64,7 @@ nlohmann::json run_baselines(const BaselinesOptions& options, const Progress& pr
     const bool holds = !is_ours || (row.at("isolated") == 0 && row.at("unequal_frames") == 0);
     report.add(std::move(row), holds);
   }
+  if (!options.with.empty()) add_methods(options, report, progress);
   return report.complete();
 }
 

@@ -78,6 +78,14 @@ struct BaselinesOptions {
   std::string backend = harness::kReferenceName;
   int64_t particles = 1500;
   uint64_t seed = 1;  // of the clusters
+  // Table 3 (benchmarks/methods.h): plugins beside this method; without any there is none.
+  std::vector<std::string> with;        // FILE.so or FILE.so,PARAMETERS
+  std::vector<int64_t> sizes = {2000};  // particles of the kidney
+  std::string truth;                    // a plugin whose finer kidney is the converged solution; empty: no errors
+  int64_t truth_particles = 16'000;
+  double youngs_modulus = 1e4;                // [Pa]
+  std::vector<int32_t> iterations = {8, 32};  // of this method, a row each
+  bool kicks = true;
 };
 nlohmann::json run_baselines(const BaselinesOptions& options, const Progress& progress);
 

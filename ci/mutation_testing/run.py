@@ -9,7 +9,7 @@ Usage: run.py [--only NAME...] [--shard I/N] [--jobs N] [--json F] [--check] [--
 
 A mutant is a patch, mutants/NN_name.patch, with a head of lines `Field: text` (a line that begins with a space goes on):
   Stage     step detect split merge expand skin, or launch: what runs kernels and puts frames together; judge: what
-            judges, reads, draws, searches or prints, so that a wrong program may pass unseen
+            judges, reads, draws, searches or prints, so that a wrong program may pass unseen; baseline: another method
   Fault     what is wrong with the program, for a person
   Suspect   the gate's command that is expected to find it; may be given several times, tried in this order. A program
             is known by its name, which is that of its CMake target; a test in Python by its file's.
@@ -43,7 +43,7 @@ ROOT = HERE.parent.parent
 WORK = ROOT / "build" / "mutation_testing"
 TREE, BUILD, RUN = WORK / "tree", WORK / "build", WORK / "run"
 TABLE = ROOT / "results" / "mutation_testing.json"
-STAGES = ("step", "detect", "split", "merge", "expand", "skin", "launch", "judge")
+STAGES = ("step", "detect", "split", "merge", "expand", "skin", "launch", "judge", "baseline")
 # What a mutant may patch: simulators, and with the stage `judge` all that says whether they are right. The tests of the
 # latter, for where suspects find nothing; without those that take minutes.
 SIMULATORS = ("gpu", "reference_cpu")
@@ -116,7 +116,7 @@ def read_mutant(path):
     if stage not in STAGES:
         raise BadMutant(f"{path.name}: Stage: '{stage}' is none of {', '.join(STAGES)}")
     files = [line[6:].split("\t")[0] for line in lines if line.startswith("+++ b/")]
-    allowed = tuple(TESTS_OF_JUDGES) if stage == "judge" else SIMULATORS
+    allowed = {"judge": tuple(TESTS_OF_JUDGES), "baseline": ("baselines",)}.get(stage, SIMULATORS)
     if not files or any(file.split("/")[0] not in allowed for file in files):
         raise BadMutant(f"{path.name}: a mutant of stage {stage} patches files of {', '.join(allowed)}, and nothing else")
     return Mutant(path.stem, path, stage, fields["Fault"][0], fields["Suspect"],
@@ -197,6 +197,8 @@ def program(name):
 
 
 def fallbacks(mutant):
+    if mutant.stage == "baseline":
+        return ["dissection_test"]
     if mutant.stage == "judge":
         tests = [test for folder in TESTS_OF_JUDGES if folder in mutant.code for test in TESTS_OF_JUDGES[folder]]
         return [test for test in dict.fromkeys(tests) if test not in mutant.suspects]
@@ -514,7 +516,7 @@ def main():
         build({"all"}, options.jobs)
         return 0
     if options.alone:
-        return run_alone([mutant for mutant in mutants if mutant.stage != "judge"], options)
+        return run_alone([mutant for mutant in mutants if mutant.stage not in ("judge", "baseline")], options)
     holds = True
     commands = sorted({command for mutant in mutants for command in mutant.suspects})
     build(targets_of(commands), options.jobs)

@@ -108,9 +108,7 @@ Scene draw_body(Random& random, const Limits& limits) {
     }
   }
   std::sort(scene.edges.begin(), scene.edges.end());
-  const auto cubes = cubes_of(number);
-  for (const auto& cube : cubes) scene.hexahedra.insert(scene.hexahedra.end(), cube.begin(), cube.end());
-  scene.tetrahedra = tetrahedra_of(cubes);
+  add_cells(scene);
   return scene;
 }
 
@@ -376,7 +374,33 @@ const SceneKind kSceneKinds[] = {
 };
 constexpr auto kSceneKindCount = static_cast<int64_t>(std::size(kSceneKinds));
 
+Question question_within(const Scene& scene, std::string kind, Precision precision, const Limits& limits,
+                         uint32_t promises) {
+  Question question;
+  question.kind = std::move(kind);
+  for (Array& array : arrays_of(scene)) question.given.push_back(as_it_is_given(std::move(array), precision));
+  question.known = {make_array("promises", {1}, std::vector<int32_t>{static_cast<int32_t>(promises)}),
+                    make_array("cut_resolution", {1}, std::vector<double>{limits.cut_resolution * scene.h})};
+  return question;
+}
+
 }  // namespace
+
+void add_cells(Scene& scene) {
+  Numbers number;
+  for (int32_t i = 0; i < scene.count(); ++i) {
+    const int32_t* const node = &scene.node[at(3 * i)];
+    number.emplace(SceneNode{node[0], node[1], node[2]}, i);
+  }
+  const auto cubes = cubes_of(number);
+  for (const auto& cube : cubes) scene.hexahedra.insert(scene.hexahedra.end(), cube.begin(), cube.end());
+  scene.tetrahedra = tetrahedra_of(cubes);
+}
+
+Question question_of(const Scene& scene, std::string kind, const PluginInfo& plugin) {
+  return question_within(scene, std::move(kind), plugin.precision, limits_of(plugin.limits, plugin.name),
+                         scene_promises(plugin.promises.value_or("")));
+}
 
 bool is_as_drawn(const std::string& kind, const oracles::RunPieces& pieces) {
   const auto known =
@@ -400,12 +424,7 @@ Question draw_within(uint64_t seed, int64_t index, Precision precision, const Li
   scene.kick.assign(scene.rest.size(), Vec3{});
   const Vec3 common = draw_motion(random, limits, scene);
   add_strokes(scene, common, kind.draw(random, scene, limits));
-  Question question;
-  question.kind = kind.name;
-  for (Array& array : arrays_of(scene)) question.given.push_back(as_it_is_given(std::move(array), precision));
-  question.known = {make_array("promises", {1}, std::vector<int32_t>{static_cast<int32_t>(promises)}),
-                    make_array("cut_resolution", {1}, std::vector<double>{limits.cut_resolution * scene.h})};
-  return question;
+  return question_within(scene, kind.name, precision, limits, promises);
 }
 
 }  // namespace

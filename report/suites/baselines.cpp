@@ -23,6 +23,57 @@ RowColumns columns_of_baselines() {
           {"clusters", "{clusters_before} -> {clusters}", Shown::terminal}};
 }
 
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+RowColumns columns_of_methods() {
+  return {{"method", "{name}"},
+          {"settings", "{settings}", Shown::page},
+          {"particles", "{particles}"},
+          {"s/s", "{seconds_per_second:.3g}"},
+          {"frame [ms]", "{1e3*frame/median:.3g}"},
+          {"cutting [ms]", "{1e3*cutting/median:.3g}", Shown::page},
+          {"error", "{error/rms:.2g}"},
+          {"pieces", "{pieces/at_least}..{pieces/at_most}"},
+          {"coupled", "{pieces/coupled}"},
+          {"felt, blade in", "{felt/blade_in:.2g}", Shown::page},
+          {"felt", "{felt/withdrawn:.2g}"},
+          {"lost", "{lost:.2g}"},
+          {"spin", "{spin_kept:.3g}"},
+          {"fragments", "{fragments}", Shown::page},
+          {"fails",
+           [](const Field& row) { return row["refused"].is_nothing() ? joined(row["fails"].texts()) : "refused"; }}};
+}
+
+void add_methods(Sheet& sheet, const Field& document) {
+  Chart chart = {"Speed against error, on the way to rest",
+                 "Each point is a run. The error is the RMS distance from a converged solution, as a share of its "
+                 "displacement: lower is nearer; left is faster.",
+                 {"computing time of a simulated second", "s", true},
+                 {"error", "1", true},
+                 {}};
+  const RowColumns columns = columns_of_methods();
+  Grid grid = grid_of("Table 3: other simulators",
+                      "All cut the same kidney of one material and are judged as runs. “coupled” are components of the "
+                      "coupling; “felt” is the share of one piece's kick that other pieces feel.",
+                      columns);
+  document["methods"].each([&](const Field& row) {
+    const bool is_refused = !row["refused"].is_nothing();
+    if (!is_refused && !row["error"].is_nothing()) {
+      curve_named(chart, row["name"].text(), Look::dots)
+          .dots.push_back(
+              {row["seconds_per_second"].number_or_null(), row["error"]["rms"].number_or_null(),
+               fmt::format("{} particles, {}", io::grouped(row["particles"].count()), row["settings"].text())});
+    }
+    add_row(grid, columns, row, is_refused || row["fails"].length() > 0 ? "warn" : "");
+  });
+  sheet.pieces.emplace_back(std::move(chart));
+  sheet.pieces.emplace_back(std::move(grid));
+}
+
 void add_baselines(Sheet& sheet, const Field& document) {
   Chart chart = {"Speed against the error of the cut",
                  "Each point is a method. The distance is the Hausdorff distance: the lower, the nearer the skin of "
@@ -51,10 +102,12 @@ void add_baselines(Sheet& sheet, const Field& document) {
                               io::grouped(document["particles"].count()));
   sheet.pieces.emplace_back(std::move(chart));
   sheet.pieces.emplace_back(std::move(grid));
+  if (document["methods"].is_there()) add_methods(sheet, document);
 }
 
 }  // namespace
 
 const Suite kBaselinesSuite = {"baselines", "rows", columns_of_baselines, add_baselines};
+const Suite kMethodsOfBaselines = {"baselines", "methods", columns_of_methods, add_methods};
 
 }  // namespace cutproof::report

@@ -34,6 +34,9 @@ inline constexpr const Suite* kSuites[] = {&kStagesSuite,      &kSamplingSuite, 
                                            &kRotationsSuite,   &kMachineLimitsSuite, &kSolverSuite,   &kBaselinesSuite,
                                            &kSensitivitySuite, &kPartsSuite,         &kCampaignsSuite};
 
+// Table 3, in the document of the suite `baselines`.
+extern const Suite kMethodsOfBaselines;
+
 // On the terminal a figure is written as its format says, and nothing is "-".
 std::string terminal_text(const RowColumn& column, const nlohmann::json& row);
 
