@@ -271,6 +271,8 @@ class RunJudge::Implementation {
     double nearest = -1;                         // measured / bound
     std::string why;                             // it was not asked
     int64_t frames = 0, failing = 0, last = -1;  // frames in which it was judged, and fails; the last of them
+    double worst = 0;                            // of what is beyond its bound, and in which frame
+    int64_t worst_frame = -1;
     bool last_holds = true;
   };
 
@@ -310,6 +312,11 @@ class RunJudge::Implementation {
     } else {
       text += fmt::format(". The property fails in {} of {} judged frames, first in frame {}", found.failing,
                           found.frames, found.verdict.frame);
+      if (found.worst_frame > found.verdict.frame && std::isfinite(found.worst)) {
+        const bool is_count = found.verdict.unit == "1";
+        text += fmt::format(", worst in frame {}: {:.3g}{}{}", found.worst_frame, found.worst, is_count ? "" : " ",
+                            is_count ? "" : found.verdict.unit);
+      }
     }
   }
   // Whether a comparison is within its bound; the first that is not is kept, or else that which comes nearest.
@@ -318,6 +325,10 @@ class RunJudge::Implementation {
     ++found.verdict.checked;
     const bool is_within = measured <= bound && std::isfinite(bound);
     count_frame(found, is_within);
+    if (!is_within && (found.worst_frame < 0 || measured > found.worst)) {
+      found.worst = measured;
+      found.worst_frame = frame_;
+    }
     const bool is_first_failure = !found.verdict.holds && found.verdict.frame == frame_ && std::isfinite(found.nearest);
     if (!found.verdict.holds && !is_first_failure) return true;
     const double ratio = is_within ? (bound > 0 ? measured / bound : 0) : std::numeric_limits<double>::infinity();
@@ -759,18 +770,27 @@ class RunJudge::Implementation {
   void partitions() {
     const std::vector<int32_t> label = coupled();
     const SweptTissue::Pieces apart = tissue_->apart();
-    std::map<int32_t, int32_t> piece_of, unit_of;  // of a component of the coupling: the piece of a unit in it
-    int64_t across = 0;
-    std::array<int32_t, 2> example = {-1, -1};
+    struct Part {
+      int64_t units = 0;
+      int32_t first = -1;
+    };
+    std::map<int32_t, std::map<int32_t, Part>> parts;  // of each component of the coupling, by piece
     for (int32_t unit = 0; unit < units_; ++unit) {
       const int32_t piece = apart.label[at(unit)];
       if (piece < 0 || tissue_->is_beside(unit)) continue;
-      const int32_t component = label[at(unit_particle(unit))];
-      const auto [known, is_new] = piece_of.emplace(component, piece);
-      if (is_new) {
-        unit_of[component] = unit;
-      } else if (known->second != piece && ++across == 1) {
-        example = {unit_particle(unit_of[component]), unit_particle(unit)};
+      Part& part = parts[label[at(unit_particle(unit))]][piece];
+      if (part.units++ == 0) part.first = unit;
+    }
+    // Those that are coupled to more units of another piece than there are of their own.
+    int64_t across = 0;
+    std::array<int32_t, 2> example = {-1, -1};
+    for (const auto& [component, of] : parts) {
+      const auto largest = std::max_element(
+          of.begin(), of.end(), [](const auto& a, const auto& b) { return a.second.units < b.second.units; });
+      for (auto part = of.begin(); part != of.end(); ++part) {
+        if (part == largest) continue;
+        if (across == 0) example = {unit_particle(largest->second.first), unit_particle(part->second.first)};
+        across += part->second.units;
       }
     }
     const char *const one = by_cells() ? "cell" : "particle", *const several = by_cells() ? "cells" : "particles";
