@@ -1,4 +1,4 @@
-// How split, merge and expand put a new list of clusters together.
+// Shared by split, merge and expand.
 #pragma once
 #include <cstddef>
 #include <span>

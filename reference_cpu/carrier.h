@@ -1,5 +1,5 @@
-// Where clusters carry what rests on their particles and beside them: by which detection and skin tell how far tissue
-// is from the blade that holds it apart. Internal to reference_cpu/.
+// Where clusters carry points at and beside their particles. Detection and skin use it to measure how far tissue is
+// from the blade that separates it. Internal to reference_cpu/.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -11,7 +11,7 @@
 
 namespace cutproof::reference {
 
-// t_c: where the weighted centre of each cluster is now, with the weights w_ic = m_i / n_i.
+// t_c: the present weighted centre of each cluster, with the weights w_ic = m_i / n_i.
 inline std::vector<Vec3> current_centers(const Body& body, const State& state, const Memberships& memberships) {
   std::vector<Vec3> centers(at(state.clusters.count()));
   for (int32_t c = 0; c < state.clusters.count(); ++c) {
@@ -27,7 +27,7 @@ inline std::vector<Vec3> current_centers(const Body& body, const State& state, c
   return centers;
 }
 
-// Where the clusters of a particle carry what rests on one of its grid edges, or in its own place (reach 0).
+// Carries points of a particle's grid edges, or the particle itself (reach 0), as its clusters do.
 class Carrier {
  public:
   Carrier(const Setup& setup, const State& state)
@@ -46,7 +46,7 @@ class Carrier {
       const std::size_t c = at(cluster);
       sum += centers_[c] + state_.clusters.rotation[c] * (rest - state_.clusters.rest_center[c]);
     }
-    // An owner without a cluster breaks I2. What hangs on it then goes with the particle, unrotated.
+    // An owner without a cluster breaks I2. Its points then move with it, unrotated.
     const auto count = memberships_.count(owner);
     return count > 0 ? sum / static_cast<double>(count) : state_.x[at(owner)] + offset;
   }

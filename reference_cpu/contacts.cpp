@@ -8,7 +8,7 @@ namespace cutproof::reference {
 
 namespace {
 
-// How often blade and walls are projected in turn where both hold at once.
+// Most alternating projections on blade and walls.
 constexpr int kMostTurns = 16;
 
 }  // namespace
@@ -19,7 +19,7 @@ Contacts::Frame Contacts::frame_of(const BladePose& pose) {
 
 Contacts::Contacts(const Setup& setup, const BladeMove* move) : setup_(setup) {
   for (const Wall& wall : setup.walls) frictionless_ = frictionless_ && wall.friction == 0;
-  // A geometric blade removes what it sweeps and touches nothing.
+  // A geometric blade removes tissue and touches nothing.
   if (move == nullptr || setup.detect.criterion == Criterion::geometric) return;
   has_blade_ = true;
   frictionless_ = frictionless_ && setup.blade.friction == 0;
@@ -45,9 +45,11 @@ Vec3 Contacts::nearest_on_blade(Vec3 c) const {
   return {std::clamp(c.x, -half_length_, half_length_), std::clamp(c.y, 0.0, depth_), 0};
 }
 
-// In the blade's frame a point is (u, w, n) with the mid-surface at n = 0, |u| <= L/2, 0 <= w <= D. Forbidden is
-// (a) what is nearer than the clearance ρ to the mid-surface, and (b) what lies over the mid-surface on the other side
-// than the one where the particle began: it could only have come there through the blade.
+// In the blade's frame a point is (u, w, n) with the mid-surface at n = 0, |u| <= L/2, 0 <= w <= D. Two sets are
+// forbidden:
+// - (a) points nearer to the mid-surface than the clearance ρ;
+// - (b) points over the mid-surface, on the side where the particle did not begin: it must have passed through the
+//   blade.
 Vec3 Contacts::way_off_blade(Vec3 x, int side) const {
   const Vec3 c = to_.local(x);
   if (is_over(c)) {
@@ -74,8 +76,8 @@ bool Contacts::touches(Vec3 x, int side) const {
   return (is_over(c) ? side * c.z : norm(c - nearest_on_blade(c))) < clearance_ + margin;
 }
 
-// The shortest way for one that came through the blade: back to its own side, or round one of the four sides of the
-// rectangle, where it has to clear the rounded rim, so at least ρ from the plane.
+// The shortest way for a particle that passed through the blade: back to its own side, or round one of the rectangle's
+// four sides. There it has to clear the rounded rim, so it stays at least ρ from the plane.
 Vec3 Contacts::way_round_a_side(Vec3 c, int side) const {
   Vec3 best = {0, 0, side * clearance_ - c.z};
   const double beyond = -side * std::max(std::abs(c.z), clearance_) - c.z;
@@ -101,13 +103,13 @@ Vec3 Contacts::project(Vec3 x, int side, bool* in_turn) const {
   return result;
 }
 
-// Coulomb friction in position form (Müller et al. 2007, Macklin et al. 2014 §6.1): a contact that moved the particle
-// by δ along its normal takes back at most μ δ of how far the particle has slid along the surface in this substep.
+// Coulomb friction in position form (Müller et al. 2007, Macklin et al. 2014 §6.1). A contact that moved the particle
+// by δ along its normal reduces the tangential slip since the substep began by min(slip, μ δ).
 Vec3 Contacts::project_with_friction(Vec3 x, int side, Vec3 start, bool* in_turn) const {
   bool turns = false;
   const Vec3 projected = project(x, side, &turns);
   if (in_turn != nullptr && turns) *in_turn = true;
-  // Blade and wall may both press on a point and leave it where it is: then it is rubbed all the same.
+  // Blade and wall can press on a point without moving it; friction still acts.
   if (frictionless_ || (projected == x && !turns)) return projected;
   Vec3 result = projected;
   const auto rub = [&result](Vec3 slid, Vec3 normal, double reach) {
@@ -126,7 +128,7 @@ Vec3 Contacts::project_with_friction(Vec3 x, int side, Vec3 start, bool* in_turn
     const Vec3 pushed = way_off_blade(x, side);
     const double depth = norm(pushed);
     if (depth > 0) {
-      // The blade's own point under the particle has moved too; only sliding against it rubs.
+      // The blade's point under the particle has moved too; friction opposes the relative slip only.
       const Vec3 carried = result - from_.global(to_.local(result));
       rub(result - start - carried, pushed / depth, setup_.blade.friction * depth);
     }

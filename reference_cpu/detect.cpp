@@ -1,4 +1,4 @@
-// Stage detect (method.md §4): which particles a cut has taken out of the tissue.
+// Stage detect (method.md §4): which particles a cut removes from the tissue.
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -46,9 +46,11 @@ std::vector<uint8_t> both_ends(const std::vector<OpenEdge>& open, std::size_t pa
   return found;
 }
 
-// The end on the blade's negative side, if its plane lies between them, or by RemovedEnds::nearer the other one, if its
-// clusters carry it nearer to the plane by more than kNearerBy; otherwise the one with more open edges; of equals the
-// one with the lower number.
+// The removed end is, in this order of precedence:
+// - the end on the blade's negative side, if the blade's plane separates the ends. RemovedEnds::nearer takes the other
+//   end if the clusters carry it nearer to the plane by more than kNearerBy;
+// - the end with more open edges;
+// - the end with the lower number.
 std::vector<uint8_t> one_end_of_each(const Setup& setup, const State& state, const std::vector<OpenEdge>& open) {
   const BladePose* blade = lowered_blade(setup, state.frame);
   const auto height = [&](Vec3 x) { return dot(x - blade->edge, cross(blade->along, blade->back)); };
@@ -87,18 +89,18 @@ std::vector<uint8_t> too_far_apart(const Setup& setup, const State& state) {
   return {};
 }
 
-// The part of the blade's sweep in which its orientation stays the same: the Minkowski sum of the mid-surface and the
-// way that the edge's middle goes. `slack` bounds how far the true sweep is from this.
+// A part of the blade's sweep without rotation: the Minkowski sum of the mid-surface and the path of the edge's middle.
+// `slack` bounds the distance to the true sweep.
 struct Sweep {
-  BladePose pose;  // where it begins
+  BladePose pose;  // at its beginning
   Vec3 way;
   double slack = 0;
 };
 
-// Whether a point is within reach of { edge + u·along + w·back + t·way : |u| <= L/2, 0 <= w <= D, 0 <= t <= 1 }: its
-// distance is that of a least squares problem in a box. The minimum lies inside one of the box's 27 faces, where it
-// solves the normal equations of the free unknowns; those that are singular have a minimum on a smaller face as well.
-// All but the point is the same for every particle, so it is decomposed once.
+// Whether a point is within reach of { edge + u·along + w·back + t·way : |u| <= L/2, 0 <= w <= D, 0 <= t <= 1 }. The
+// distance is a least squares problem in a box. Its minimum lies inside one of the box's 27 faces and solves the normal
+// equations of the face's free unknowns. Singular equations are skipped: a smaller face then has a minimum too. Only
+// the point differs between particles, so everything else is decomposed once.
 class SweepFaces {
  public:
   SweepFaces(const Blade& blade, const Sweep& sweep) : edge_(sweep.pose.edge) {
@@ -133,14 +135,14 @@ class SweepFaces {
 
  private:
   struct Face {
-    std::vector<Vec3> fixed;  // what the unknowns that are not free contribute
+    std::vector<Vec3> fixed;  // contributions of the fixed unknowns
     Eigen::Index count = 0;   // of free unknowns
     Eigen::Matrix3d directions;
     double low[3], high[3];
     Eigen::ColPivHouseholderQR<Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 3>> qr;
   };
 
-  // Distance to the point of the face's own plane that is nearest, if that lies in the face; otherwise infinite.
+  // Distance to the nearest point of the face's plane, if that point lies in the face; otherwise infinite.
   static double distance(const Face& face, Vec3 rest) {
     for (const Vec3 part : face.fixed) rest -= part;
     if (face.count == 0) return norm(rest);
@@ -161,7 +163,7 @@ Vec3 turned(Vec3 v, Vec3 axis, double angle) {  // Rodrigues
   return std::cos(angle) * v + std::sin(angle) * cross(axis, v) + (1 - std::cos(angle)) * dot(axis, v) * axis;
 }
 
-// A turning move is cut into so many translations that each is off by at most a twentieth of a spacing.
+// Splits a rotating move into translations, each wrong by at most a twentieth of h.
 std::vector<Sweep> sweeps_of(const Blade& blade, const BladeMove& move, double spacing) {
   const BladePose &from = move.from, &to = move.to;
   const Vec3 way = to.edge - from.edge;
@@ -189,9 +191,10 @@ std::vector<Sweep> sweeps_of(const Blade& blade, const BladeMove& move, double s
   return sweeps;
 }
 
-// A node goes if it is within half the blade's thickness of the swept mid-surface, or within half of its longest edge:
-// whichever edge the blade crosses then loses an end, also where tissue is stretched. At rest the longest edge is h.
-// Ties go to removal: a blade halfway between two layers of nodes takes both, and rounding must not leave it none.
+// A node is removed if its distance from the swept mid-surface is at most half the blade's thickness or half its
+// longest edge. So each edge that the blade crosses loses an end, stretched tissue included. At rest the longest edge
+// is h. Ties are removed: a blade halfway between two layers of nodes removes both, and rounding must not leave it
+// none.
 std::vector<uint8_t> swept_over(const Setup& setup, const State& state) {
   constexpr double kTie = 1 + 1e-9;
   const double h = setup.body.grid.spacing;
@@ -206,7 +209,7 @@ std::vector<uint8_t> swept_over(const Setup& setup, const State& state) {
     for (const Sweep& sweep : sweeps_of(setup.blade, move, h)) {
       const SweepFaces faces(setup.blade, sweep);
       const Vec3 normal = cross(sweep.pose.along, sweep.pose.back);
-      // The sweep's bounding box in the blade's own directions spares most particles the exact distance.
+      // A bounding box along the blade's axes spares most particles the exact distance.
       const Vec3 axes[3] = {sweep.pose.along, sweep.pose.back, normal};
       double low[3] = {-setup.blade.length / 2, 0, 0}, high[3] = {setup.blade.length / 2, setup.blade.depth, 0};
       for (int k = 0; k < 3; ++k) {
@@ -229,9 +232,9 @@ std::vector<uint8_t> swept_over(const Setup& setup, const State& state) {
   return found;
 }
 
-// The criterion that the paper rejects (its §2.3 and Fig. 7): a particle goes if the deformation gradient A A0⁻¹ of one
-// of its clusters stretches some direction by more than the threshold. A cluster without extent in some direction
-// says nothing about it; the pseudo-inverse leaves it out.
+// The criterion that AFCC rejects (§2.3 and Fig. 7): a particle is removed if the deformation gradient A A0⁻¹ of one of
+// its clusters stretches some direction beyond the threshold. The pseudo-inverse leaves out directions in which the
+// cluster has no extent.
 std::vector<uint8_t> too_much_strain(const Setup& setup, const State& state) {
   const Body& body = setup.body;
   const Clusters& clusters = state.clusters;

@@ -1,8 +1,7 @@
 // Expand (method.md §7): clusters take in neighbouring particles, so that connected tissue is coupled.
 //
-// A cluster only ever takes in particles along edges of G that leave it, so it stays connected (I1). After
-// edge_cover every edge of G has a cluster that holds both of its ends (I4), hence no group of clusters is isolated
-// (method.md §2, lemma).
+// A cluster takes in particles only along edges of G, so it stays connected (I1). After edge_cover each edge of G lies
+// in a cluster (I4), so no group of clusters is isolated (method.md §2, lemma).
 #include <algorithm>
 #include <iterator>
 #include <utility>
@@ -13,7 +12,7 @@
 namespace cutproof::reference {
 namespace {
 
-// A cluster (index) takes in a particle. Lists of these are kept sorted and free of duplicates.
+// A cluster (index) and the particle that it takes in. Lists of these are sorted, without duplicates.
 using Addition = std::pair<int32_t, int32_t>;
 
 void sort_unique(std::vector<Addition>& additions) {
@@ -37,8 +36,8 @@ bool holds(const Memberships& memberships, int32_t particle, int32_t cluster) {
   return std::binary_search(clusters.begin(), clusters.end(), cluster);
 }
 
-// For every edge of G that no cluster contains: among the clusters that hold one of its ends the smallest (the
-// lowest number among equals) takes in the other end.
+// For every edge of G that no cluster contains: the smallest cluster at one of its ends takes in the other end. Of
+// equally small clusters the lowest number decides.
 std::vector<Addition> cover_edges(const Body& body, const State& state, const Memberships& memberships) {
   std::vector<Addition> additions;
   for (int32_t a = 0; a < body.particle_count(); ++a) {
@@ -62,8 +61,8 @@ std::vector<Addition> cover_edges(const Body& body, const State& state, const Me
   return additions;
 }
 
-// The paper's rule (§2.2.2), cluster by cluster: one that shares no particle with any other takes in the outside
-// ends of the edges of G that leave it.
+// AFCC's rule (§2.2.2), cluster by cluster: a cluster that shares no particle takes in the outside ends of the edges of
+// G that leave it.
 std::vector<Addition> free_lone_clusters(const Body& body, const State& state, const Memberships& memberships) {
   std::vector<Addition> additions;
   for (int32_t c = 0; c < state.clusters.count(); ++c) {
@@ -81,8 +80,8 @@ std::vector<Addition> free_lone_clusters(const Body& body, const State& state, c
   return additions;
 }
 
-// One layer more for each cluster that grows: the G-neighbours of its last additions that share a cluster (of the
-// stage's input) with them. `all` holds every addition so far, sorted.
+// Adds one layer to each growing cluster: G-neighbours of its last additions that share a cluster of the stage's input
+// with them. `all`: every addition so far, sorted.
 std::vector<Addition> next_layer(const Body& body, const State& state, const Memberships& memberships,
                                  const std::vector<Addition>& last, const std::vector<Addition>& all) {
   std::vector<Addition> layer;
@@ -98,7 +97,6 @@ std::vector<Addition> next_layer(const Body& body, const State& state, const Mem
   return layer;
 }
 
-// All additions at once.
 Clusters grown(const Clusters& before, const std::vector<Addition>& additions) {
   Clusters after;
   auto next = additions.begin();

@@ -1,11 +1,11 @@
-// Where the plane is by which detection and skin tell the two sides of a cut. Internal to reference_cpu/.
+// The plane that separates the two sides of a cut for detection and skin. Internal to reference_cpu/.
 #pragma once
 #include "model/at.h"
 #include "model/setup.h"
 
 namespace cutproof::reference {
 
-// Where the blade stood last in a frame while it was lowered; null if it never was, or if the schedule is over.
+// The last pose in which the blade was lowered in a frame; null if it never was, or if the schedule is over.
 inline const BladePose* lowered_blade(const Setup& setup, int64_t frame) {
   const BladePose* pose = nullptr;
   const bool scheduled = setup.has_blade && frame < setup.frame_count();

@@ -31,8 +31,8 @@ void update_rest_frames(const Body& body, Clusters& clusters) {
   clusters.mass.assign(count, 0.0);
   clusters.rest_center.assign(count, Vec3{});
   for (int32_t c = 0; c < clusters.count(); ++c) {
-    // Relative to one member: an error of T_c pushes the cluster the same way in every iteration, so it is kept to the
-    // rounding of the result.
+    // Relative to one member, which keeps T_c accurate to the rounding of the result. An error of T_c pushes the
+    // cluster the same way in every iteration.
     const Vec3 base = rest[static_cast<std::size_t>(clusters.of(c).front())];
     double mass = 0;
     Vec3 moment;

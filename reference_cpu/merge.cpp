@@ -1,4 +1,4 @@
-// Merge (method.md §6): small clusters join neighbours, so that cutting does not leave ever more and softer clusters.
+// Merge (method.md §6): small clusters join neighbours, so that cuts do not keep adding smaller, softer clusters.
 #include <algorithm>
 #include <limits>
 #include <numeric>
@@ -13,8 +13,7 @@
 namespace cutproof::reference {
 namespace {
 
-// The sets of one merge, as they grow. A set is known by its slot, its index in the input; a set that was merged
-// into another one has a dead slot.
+// The growing sets of one merge. A set's slot is its index in the input; a set merged into another leaves a dead slot.
 class MergingSets {
  public:
   MergingSets(const Body& body, const std::vector<uint8_t>& alive, std::vector<std::vector<int32_t>> sets,
@@ -47,11 +46,11 @@ class MergingSets {
   int32_t number(int32_t slot) const { return numbers_[at(slot)]; }
   int64_t size(int32_t slot) const { return static_cast<int64_t>(sets_[at(slot)].size()); }
 
-  // Slots of the sets with fewer than tau particles, in the order of their numbers.
+  // Slots of sets with fewer than tau particles, in the order of numbers.
   const std::vector<int32_t>& small() const { return small_; }
 
-  // The set that `s` would join: it touches s (shares a particle, or an edge of G joins them), the union has at most
-  // cap particles or s lies inside it; the smallest such, then the one with the lowest number.
+  // The set that `s` would join. It shares a particle with s, or an edge of G joins them. The union has at most cap
+  // particles, or the set contains s. The smallest such set, of equals the lowest number.
   std::optional<int32_t> preferred_target(int32_t s) {
     std::vector<int32_t> touching;
     ++visit_;
@@ -84,7 +83,7 @@ class MergingSets {
     return best;
   }
 
-  // Lets `target` take in `source`, whose slot dies.
+  // `target` takes in `source`, whose slot dies.
   void join(int32_t source, int32_t target) {
     std::vector<int32_t>& from = sets_[at(source)];
     std::vector<int32_t>& to = sets_[at(target)];
@@ -106,7 +105,7 @@ class MergingSets {
     exists_[at(source)] = 0;
   }
 
-  // To be called after joins: drops from small() what is merged or has grown.
+  // Call after joins: drops merged and grown sets from small().
   void update_small() {
     std::erase_if(small_, [&](int32_t slot) { return !exists_[at(slot)] || size(slot) >= tau_; });
   }
@@ -127,7 +126,7 @@ class MergingSets {
 
  private:
   static std::size_t at(int32_t index) { return static_cast<std::size_t>(index); }
-  // Slots of the sets that hold a particle, in no order. Joining never makes them more.
+  // Slots of the sets that contain a particle, unordered. Joining never increases their number.
   std::span<int32_t> memberships_of(int32_t p) {
     return {memberships_.data() + first_holder_[at(p)], holder_count_[at(p)]};
   }
@@ -138,17 +137,17 @@ class MergingSets {
   int64_t tau_, cap_;
   std::vector<std::vector<int32_t>> sets_;  // by slot
   std::vector<uint8_t> exists_;             // by slot
-  std::vector<std::size_t> first_holder_;   // [n + 1] where a particle's row of memberships_ begins
-  std::vector<std::size_t> holder_count_;   // [n] how much of its row is in use
+  std::vector<std::size_t> first_holder_;   // [n + 1] begin of each particle's row of memberships_
+  std::vector<std::size_t> holder_count_;   // [n] used length of the row
   std::vector<int32_t> memberships_;
   std::vector<int32_t> small_;
   // Scratch of preferred_target.
   struct Touch {
-    int32_t visit = 0;   // the last call that met the set
-    int32_t shared = 0;  // particles of it that it shares with the one asked about
+    int32_t visit = 0;   // last call that met the set
+    int32_t shared = 0;  // particles shared with the set in question
   };
-  int32_t visit_ = 0;             // calls so far that looked
-  std::vector<int32_t> visited_;  // by particle: the last of them that looked at it
+  int32_t visit_ = 0;             // calls that searched
+  std::vector<int32_t> visited_;  // by particle: the last such call that visited it
   std::vector<Touch> touches_;    // by slot
 };
 
@@ -181,7 +180,7 @@ Key key_of(int32_t source_number, int32_t target_number, uint32_t round) {
 void merge_deterministic(MergingSets& sets, std::size_t slot_count) {
   constexpr Key kNone = {std::numeric_limits<uint32_t>::max(), std::numeric_limits<int32_t>::max(),
                          std::numeric_limits<int32_t>::max(), std::numeric_limits<int32_t>::max()};
-  std::vector<Key> least(slot_count, kNone);  // by slot: the smallest key of a proposal that names it
+  std::vector<Key> least(slot_count, kNone);  // by slot: smallest key of the proposals that name it
   for (uint32_t round = 0;; ++round) {
     std::vector<std::pair<Key, Proposal>> proposals;
     for (const int32_t s : sets.small()) {
@@ -214,10 +213,10 @@ void merge_deterministic(MergingSets& sets, std::size_t slot_count) {
 
 // --- published -------------------------------------------------------------------------------------------------
 
-// The paper's claims (§2.2.3) with roles locked and passes repeated, in the schedule in which clusters come in the
-// order of their numbers. In a pass each small cluster claims its preferred target, once; the claim fails if the
-// claimer has been claimed or the target has any role already. A pass without a claim ends the merging: then no
-// small cluster has a target, because the first that had one would have succeeded.
+// AFCC's claims (§2.2.3) with roles locked and passes repeated, clusters in the order of their numbers. In a pass each
+// small cluster claims its preferred target once. The claim fails if the claimer has been claimed or the target has any
+// role. A pass without a claim ends the merge: no small cluster has a target, because the first to have one would have
+// succeeded.
 void merge_published(MergingSets& sets, std::size_t slot_count) {
   std::vector<uint8_t> has_role(slot_count, 0);
   for (;;) {

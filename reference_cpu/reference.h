@@ -1,5 +1,5 @@
-// The CPU reference: double precision, serial, readable. Each stage is a function from a state to the next one and
-// stands in a file of its name. Correct first; compare anything else with it.
+// The CPU reference: double precision, serial, readable. Each stage is a function from a state to the next one, in a
+// file of its name.
 #pragma once
 #include <memory>
 #include <span>
@@ -24,9 +24,9 @@ void skin(const Setup& setup, State& state);
 
 std::unique_ptr<Backend> make_backend();
 
-// --- Pieces that cooking, tests and tools use on their own -------------------------------------------------------
+// --- Parts that cooking, tests and tools use alone ---------------------------------------------------------------
 
-// For each particle the clusters (indices, ascending) that hold it, as compressed rows.
+// Each particle's containing clusters (indices, ascending), as compressed rows.
 struct Memberships {
   std::vector<int64_t> offsets;   // [n + 1]
   std::vector<int32_t> clusters;  // cluster indices, ascending within each particle
@@ -41,12 +41,12 @@ struct Memberships {
 };
 Memberships memberships_of(const Clusters& clusters, int32_t particle_count);
 
-// T_c and M_c of every cluster, from the present memberships (method.md §5, Rest frames). Recomputing all of them
-// gives the same bits as recomputing those that changed.
+// T_c and M_c of every cluster, from the present memberships (method.md §5, Rest frames). Recomputing unchanged ones
+// gives the same bits.
 void update_rest_frames(const Body& body, Clusters& clusters);
 
-// One rotation problem (method.md §3): argmax over rotations R of tr(Rᵀ A). Among several answers the one nearest to
-// `previous`. `degenerate` says that the answer was not unique, or that A was not finite (then R = previous).
+// One rotation problem (method.md §3): argmax over rotations R of tr(Rᵀ A); of several answers the nearest to
+// `previous`. `degenerate`: the answer was not unique, or A was not finite (then R = previous).
 struct Rotation {
   Mat3 r;
   bool degenerate = false;
@@ -57,7 +57,7 @@ Rotation closest_rotation(const Mat3& a, const Mat3& previous);
 // particles is small. `numbers` are distinct. Does not touch rest frames. `rule` must not be none.
 struct Merged {
   std::vector<std::vector<int32_t>> sets;  // unions, in the order of their numbers
-  std::vector<int32_t> survivor;  // for each set of the result the index of the input set whose number it keeps
+  std::vector<int32_t> survivor;           // index of the input set whose number each set of the result keeps
 };
 Merged merge_sets(const Body& body, const std::vector<uint8_t>& alive, std::vector<std::vector<int32_t>> sets,
                   const std::vector<int32_t>& numbers, MergeRule rule, int64_t tau, int64_t cap);

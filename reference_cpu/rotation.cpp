@@ -7,12 +7,12 @@
 
 namespace cutproof::reference {
 
-// Horn's method (Horn 1987, "Closed-form solution of absolute orientation using unit quaternions"): with q the unit
-// quaternion of R, tr(Rᵀ A) = qᵀ N q for the symmetric 4 × 4 matrix N below, so the best rotations are the unit
-// vectors of the eigenspace of N's largest eigenvalue. With singular values σ1 >= σ2 >= |σ3| of A (σ3 < 0 if det A
-// < 0) the two largest eigenvalues differ by 2 (σ2 + σ3). Where that vanishes - rank one, a reflection with two
-// equal singular values, no extent at all - the eigenspace has more than one dimension, and projecting the previous
-// quaternion onto it gives the nearest of all answers.
+// Horn's method (Horn 1987, "Closed-form solution of absolute orientation using unit quaternions"). With q the unit
+// quaternion of R, tr(Rᵀ A) = qᵀ N q for the symmetric 4 × 4 matrix N below. So the best rotations are the unit vectors
+// in the eigenspace of N's largest eigenvalue. Let σ1 >= σ2 >= |σ3| be the singular values of A (σ3 < 0 if det A < 0).
+// The two largest eigenvalues differ by 2 (σ2 + σ3). This vanishes for rank one, for a reflection with two equal
+// singular values, and without any extent. The eigenspace then has several dimensions, and the previous quaternion
+// projected onto it gives the nearest answer.
 Rotation closest_rotation(const Mat3& a, const Mat3& previous) {
   double scale = 0;
   for (const double entry : a.m) {
@@ -21,8 +21,8 @@ Rotation closest_rotation(const Mat3& a, const Mat3& previous) {
   }
   if (scale == 0) return {previous, true};
 
-  // Scaled to 1, so that neither tiny nor huge clusters underflow or overflow. A division, because the reciprocal of
-  // a denormal scale is infinite.
+  // Scaled to 1, so that neither tiny nor huge clusters underflow or overflow. The reciprocal of a denormal scale is
+  // infinite, so this divides.
   Eigen::Matrix3d s;  // s(i, j) = Σ w X_i x_j, that is Aᵀ
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) s(column, row) = a(row, column) / scale;
@@ -35,8 +35,8 @@ Rotation closest_rotation(const Mat3& a, const Mat3& previous) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> eigen(n);
   const Eigen::Vector4d& values = eigen.eigenvalues();  // ascending
 
-  // Rounding moves eigenvalues by a few 2^-53 of the norm (at most 6 here); 1e-12 is far above that and far below
-  // any difference that a rotation could depend on.
+  // Rounding moves eigenvalues by a few 2^-53 of the norm (at most 6 here). 1e-12 is far above that, and far below any
+  // difference that a rotation could depend on.
   constexpr double kSameEigenvalue = 1e-12;
   const double top = values[3];
   int dimension = 1;
@@ -52,7 +52,7 @@ Rotation closest_rotation(const Mat3& a, const Mat3& previous) {
     const Eigen::Vector4d p(before.w(), before.x(), before.y(), before.z());
     const auto space = eigen.eigenvectors().rightCols(dimension);
     const Eigen::Vector4d projected = space * (space.transpose() * p);
-    // A previous rotation at right angles to all answers is equally far from each: any will do.
+    // A previous rotation orthogonal to all answers is equally far from each.
     if (projected.norm() > 1e-9) q = projected;
   }
   const Eigen::Matrix3d best = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized().toRotationMatrix();

@@ -1,4 +1,4 @@
-// Skin (method.md §8): marching cubes on the background grid, its vertices carried by the clusters.
+// Skin (method.md §8): marching cubes on the background grid; clusters carry the vertices.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -64,24 +64,24 @@ void extract(const Body& body, const std::vector<uint8_t>& alive, Skin& skin) {
 
 // --- Positions --------------------------------------------------------------------------------------------------
 
-// How far from its owner a vertex lies that a cut brings about, as a fraction of h, given how far from the plane of the
-// blade the owner's clusters carry the two ends of its grid edge [h, with signs]: where the edge crosses that plane;
-// within [1/16, 15/16], because it stays on its edge; and the farther the plane is from the edge, or the flatter the
-// edge lies to it, the nearer to alpha. Continuous, so that rounding moves the vertex and decides nothing (method.md
+// Distance of a new cut vertex from its owner, as a fraction of h. `owner`, `end`: signed heights over the blade's
+// plane to which the owner's clusters carry the ends of the grid edge [h]. The vertex goes where the edge crosses the
+// plane, within [1/16, 15/16], because it stays on its edge. It comes nearer to alpha the farther the plane is from the
+// edge, or the flatter the edge lies to it. Continuity makes rounding move the vertex and decide nothing (method.md
 // §8).
 double cut_reach(double owner, double end, double alpha) {
   constexpr double kLeast = double{kLeastCrossing} / kCrossingSteps, kGreatest = 1 - kLeast;
-  constexpr double kFlat = 0.25;           // the sine of the angle below which an edge says less and less
-  const double t = owner / (owner - end);  // of the edge, from the owner on
-  if (!(t > -1 && t < 3)) return alpha;    // so if it is parallel to the plane
+  constexpr double kFlat = 0.25;           // sine of the angle below which an edge counts less and less
+  const double t = owner / (owner - end);  // position on the edge, from the owner
+  if (!(t > -1 && t < 3)) return alpha;    // also if it is parallel to the plane
   const double crossing = t < 0   ? kLeast - t * (alpha - kLeast)
                           : t > 2 ? kGreatest + (t - 2) * (alpha - kGreatest)
                                   : std::clamp(t, kLeast, kGreatest);
   return alpha + std::min(1.0, std::abs(owner - end) / kFlat) * (crossing - alpha);
 }
 
-// Vertices that were there before stay where they were on their edges. Beside what has died in this frame the blade has
-// brought about new ones, where it crosses their edges; of all others the body knows.
+// Existing vertices keep their places on their edges. Vertices beside particles that died in this frame go where the
+// blade crosses their edges. The body gives the places of all others.
 void find_reaches(const Setup& setup, const Skin& before, const Carrier& carried, State& state) {
   const Body& body = setup.body;
   Skin& skin = state.skin;

@@ -33,9 +33,9 @@ std::array<std::array<int, 4>, 6> face_corners() {
   return faces;
 }
 
-// Rule 1: for each crossed edge the crossed edge that follows it in its polygon; -1 for edges that are not crossed.
-// On each face the contour runs round every run of inside corners, from where the border of the face enters it to
-// where it leaves it. So the two inside corners of an ambiguous face are separated.
+// Rule 1: the next crossed edge of each crossed edge's polygon; -1 for edges that are not crossed. On each face the
+// contour goes round every run of inside corners, from where the border enters the run to where it leaves it. So the
+// two inside corners of an ambiguous face are separated.
 std::array<int, 12> contour(int inside) {
   std::array<int, 12> next;
   next.fill(-1);
@@ -53,8 +53,8 @@ std::array<int, 12> contour(int inside) {
   return next;
 }
 
-// Rule 2: a polygon is fanned from its first vertex, counted from its lowest edge, whose diagonals never join two
-// vertices of one face: the cell beyond that face could have the same diagonal, and an edge with four triangles.
+// Rule 2: a polygon is fanned from its first vertex, from its lowest edge on, whose diagonals never join two vertices
+// of one face. The cell beyond that face could have the same diagonal, and so an edge with four triangles.
 std::size_t find_fan_start(const std::vector<int>& polygon) {
   const std::size_t n = polygon.size();
   for (std::size_t start = 0; start < n; ++start) {
@@ -96,7 +96,7 @@ const std::array<CellEdge, 12>& cell_edges() {
 bool on_one_face(int edge_a, int edge_b) {
   const CellEdge& a = cell_edges()[static_cast<std::size_t>(edge_a)];
   const CellEdge& b = cell_edges()[static_cast<std::size_t>(edge_b)];
-  // All four ends have some bit (coordinate) in common.
+  // All four ends share a bit (coordinate).
   return (a.low & a.high & b.low & b.high) != 0 || (a.low | a.high | b.low | b.high) != 7;
 }
 

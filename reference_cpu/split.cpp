@@ -1,4 +1,4 @@
-// Split (method.md §5): a cluster that lost particles becomes the connected components of what is left of it.
+// Split (method.md §5): a cluster that lost particles becomes the connected components of its rest.
 #include <algorithm>
 #include <utility>
 
@@ -8,14 +8,14 @@
 namespace cutproof::reference {
 namespace {
 
-// Components of the subgraph of G that a set of particles induces: each ascending, ordered by smallest particle.
-// Reused for set after set, so that one set costs no more than its own size.
+// Components of the subgraph of G induced by a set of particles: each ascending, ordered by smallest particle.
+// Reusable, so that one set costs no more than its own size.
 class ComponentSearch {
  public:
   ComponentSearch(const Body& body, const std::vector<uint8_t>& alive)
       : body_(body), alive_(alive), waiting_(static_cast<std::size_t>(body.particle_count()), 0) {}
 
-  // `particles` ascending; dead ones among them are passed over.
+  // `particles`: ascending; dead ones are skipped.
   std::vector<std::vector<int32_t>> components_of(std::span<const int32_t> particles) {
     for (const int32_t p : particles) waiting_[static_cast<std::size_t>(p)] = alive_[static_cast<std::size_t>(p)];
     std::vector<std::vector<int32_t>> components;
@@ -44,7 +44,7 @@ class ComponentSearch {
   std::vector<uint8_t> waiting_;  // [n] 1: in the set and not yet in a component
 };
 
-// Removes the components of G with fewer than `fewest` particles and gives the removed ones, ascending.
+// Removes the components of G with fewer than `fewest` particles and returns the removed particles, ascending.
 std::vector<int32_t> remove_debris(const Body& body, int32_t fewest, std::vector<uint8_t>& alive) {
   std::vector<int32_t> all(static_cast<std::size_t>(body.particle_count()));
   for (std::size_t p = 0; p < all.size(); ++p) all[p] = static_cast<int32_t>(p);
@@ -68,9 +68,10 @@ void split(const Setup& setup, State& state) {
   const auto is_dead = [&](int32_t p) { return state.alive[static_cast<std::size_t>(p)] == 0; };
   ComponentSearch search(setup.body, state.alive);
 
-  // By I2 a cluster held no dead particle when the frame began: one that holds a dead particle now has lost it.
+  // By I2 no cluster contained a dead particle when the frame began, so a dead member was lost in this frame.
   Clusters after;
-  std::vector<std::pair<int32_t, std::vector<int32_t>>> separated;  // parent, members: those that get new numbers
+  std::vector<std::pair<int32_t, std::vector<int32_t>>>
+      separated;  // parent, members of the components that get new numbers
   bool changed = false;
   for (int32_t c = 0; c < before.count(); ++c) {
     const auto members = before.of(c);
@@ -81,7 +82,7 @@ void split(const Setup& setup, State& state) {
     }
     changed = true;
     auto components = search.components_of(members);
-    if (components.empty()) continue;  // nothing is left: the cluster vanishes
+    if (components.empty()) continue;  // the cluster vanishes
     append_cluster(after, components.front(), number, before, c);
     for (std::size_t k = 1; k < components.size(); ++k) separated.emplace_back(c, std::move(components[k]));
   }

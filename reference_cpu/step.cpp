@@ -16,7 +16,7 @@ struct Pose {
   Mat3 rotation;
 };
 
-// For every particle: how far a grip moves it in the substep, or not held at all.
+// For each particle: its displacement by a grip in the substep, or that no grip holds it.
 struct Held {
   std::vector<uint8_t> yes;
   std::vector<Vec3> displacement;
@@ -35,8 +35,8 @@ Held held_particles(const Setup& setup, int64_t substep) {
   return held;
 }
 
-// Chebyshev semi-iteration (Golub and Varga 1961; method.md §11), restarted in every substep: with g_j where the
-// plain iteration goes from x_j,  x_j+1 = x_j + pull (g_j - x_j) + carry (x_j - x_j-1). The first iteration is plain.
+// Chebyshev semi-iteration (Golub and Varga 1961; method.md §11), restarted in every substep. With g_j the result of
+// the plain iteration from x_j: x_j+1 = x_j + pull (g_j - x_j) + carry (x_j - x_j-1). The first iteration is plain.
 class Chebyshev {
  public:
   explicit Chebyshev(double kdt2) {
@@ -57,21 +57,21 @@ class Chebyshev {
   }
 
  private:
-  // End of the interval [0, b] of eigenvalues that the weights are made for. Beyond it, rotations that are far from
-  // their answer would be overshot again and again.
+  // The weights suit eigenvalues in [0, b]; this is b. A greater b would overshoot rotations far from their answer
+  // again and again.
   static constexpr double kGreatestEigenvalue = 0.95;
   double radius_, stretch_, omega_ = 1;
   int64_t order_ = 0;
 };
 
-// Where elasticity acts (method.md §3): on y = x + τ v, with v the velocity of the substep, which a particle that began
-// it at x_prev ends with. As x - x_prev = dt v, y lies ahead of x by τ / dt of the way that x has come.
+// Elasticity acts on y = x + τ v (method.md §3). v is the velocity of the substep that takes a particle from x_prev to
+// x, so x - x_prev = dt v. y is thus ahead of x by τ / dt times that displacement.
 class Ahead {
  public:
   Ahead(double dt, double retardation) : share_(dt / (dt + retardation)) {}
-  // dt / (dt + τ): of the way to y, x has come so far.
+  // dt / (dt + τ): the share of the way to y at which x is.
   double share() const { return share_; }
-  // Without retardation the two are one, to the bit.
+  // Without retardation y equals x in all bits.
   Vec3 of(Vec3 x, Vec3 start) const { return share_ == 1 ? x : start + (x - start) / share_; }
   Vec3 back(Vec3 y, Vec3 start) const { return share_ == 1 ? y : start + share_ * (y - start); }
 
@@ -85,7 +85,7 @@ std::vector<Pose> match_shapes(const Body& body, const Memberships& memberships,
   std::vector<Pose> poses(at(clusters.count()));
   for (int32_t c = 0; c < clusters.count(); ++c) {
     Pose& pose = poses[at(c)];
-    // Summed relative to one member, so that a far away cluster loses no digits.
+    // Relative to one member, so that a distant cluster loses no digits.
     const Vec3 base = x[at(clusters.of(c).front())];
     for (const int32_t i : clusters.of(c)) {
       pose.center += (body.mass[at(i)] / static_cast<double>(memberships.count(i))) * (x[at(i)] - base);
@@ -94,7 +94,7 @@ std::vector<Pose> match_shapes(const Body& body, const Memberships& memberships,
 
     Mat3 a;
     a.m.fill(0);
-    Vec3 moment, rest_moment;  // zero, but for the rounding of t_c, of T_c and of M_c
+    Vec3 moment, rest_moment;  // rounding of t_c, of T_c and of M_c
     for (const int32_t i : clusters.of(c)) {
       const double weight = body.mass[at(i)] / static_cast<double>(memberships.count(i));
       const Vec3 now = weight * (x[at(i)] - pose.center);
@@ -107,7 +107,7 @@ std::vector<Pose> match_shapes(const Body& body, const Memberships& memberships,
     }
     const Rotation best = closest_rotation(a, clusters.rotation[at(c)]);
     pose.rotation = best.r;
-    // Left in, it would push the cluster the same way in every iteration, and the body's momentum with it.
+    // Otherwise it would push the cluster, and change the body's momentum, in every iteration.
     pose.center += (moment - best.r * rest_moment) / clusters.mass[at(c)];
     clusters.rotation[at(c)] = best.r;
     clusters.degenerate[at(c)] = best.degenerate;
@@ -115,7 +115,7 @@ std::vector<Pose> match_shapes(const Body& body, const Memberships& memberships,
   return poses;
 }
 
-// g_i: where its clusters would have particle i, on average. In no cluster a particle has its own place as its goal.
+// g_i: the mean of the positions that its clusters demand of particle i. A particle in no cluster has its own place.
 Vec3 goal(const Body& body, const Memberships& memberships, const Clusters& clusters, const std::vector<Pose>& poses,
           int32_t i, Vec3 x) {
   if (memberships.count(i) == 0) return x;
@@ -144,8 +144,8 @@ void substep(const Setup& setup, const Memberships& memberships, int64_t index, 
   std::vector<Vec3> predicted_ahead(at(n));
   std::vector<Vec3> y(at(n));
   std::vector<int> side(at(n), +1);
-  // What contacts and grips have displaced, times mass: Σ m (x - where the solver alone would have put it), carried
-  // through the iterations as the solver carries positions. Divided by dt it is their impulse.
+  // Σ m times the displacement by contacts and grips, carried through the iterations as the solver carries positions.
+  // Divided by dt it is their impulse.
   Vec3 pushed;
   const bool accelerated = parameters.acceleration == Acceleration::chebyshev;
   Chebyshev chebyshev(kdt2);
@@ -176,10 +176,10 @@ void substep(const Setup& setup, const Memberships& memberships, int64_t index, 
       const Vec3 free_ahead = accelerated ? chebyshev.combine(plain_ahead, now[at(i)], earlier[at(i)]) : plain_ahead;
       const Vec3 plain = ahead.back(plain_ahead, start[at(i)]), free = ahead.back(free_ahead, start[at(i)]);
       const Vec3 x = state.x[at(i)];
-      Vec3 next = x;  // a held particle stays where its grip has put it
+      Vec3 next = x;  // a grip holds its particles in place
       if (!held.yes[at(i)]) {
         next = contacts.next_position(free, side[at(i)], start[at(i)], x);
-        // Where several answers are right, the way there decides: touched particles go the plain way.
+        // Of several fixed points the path decides; touched particles follow the plain iteration.
         if (accelerated && contacts.path_matters()) {
           const bool touched = contacts.touches(free, side[at(i)]) || contacts.touches(plain, side[at(i)]);
           if (touched) next = contacts.next_position(plain, side[at(i)], start[at(i)], x);
@@ -189,8 +189,8 @@ void substep(const Setup& setup, const Memberships& memberships, int64_t index, 
       state.x[at(i)] = next;
       y[at(i)] = ahead.of(next, start[at(i)]);
     }
-    // Both solvers carry Σ m x from one iteration to the next exactly: the implicit one draws it to x~ by 1 - s, and
-    // acceleration combines the sums as it does the positions.
+    // Σ m x changes exactly so: the implicit solver draws it to x~ by 1 - s, and acceleration combines sums as it
+    // combines positions.
     Vec3 carried = (implicit ? s : 1.0) * pushed;
     if (accelerated) carried = chebyshev.combine(carried, pushed, pushed_earlier);
     pushed_earlier = pushed;
@@ -212,7 +212,7 @@ void step(const Setup& setup, State& state) {
   state.removed.clear();
   state.debris.clear();
   state.impulse = {};
-  // Without iterations containing clusters are not needed.
+  // Only iterations need containing clusters.
   const Memberships memberships =
       setup.step.iterations > 0 ? memberships_of(state.clusters, setup.body.particle_count()) : Memberships{};
   const double dt = setup.substep_length[at(state.frame)];
