@@ -22,10 +22,10 @@ namespace cutproof::gpu {
 
 namespace {
 
-// Memory of the host into which the device copies by itself. It grows and never shrinks: making it takes long.
+// Host memory to which the device copies on its own. It grows and never shrinks, because allocating it takes long.
 class LandingPlace {
  public:
-  // More is not worth the memory: copies of large arrays go fast without it.
+  // Copies of large arrays are fast without it.
   static constexpr std::size_t kMost = std::size_t{64} << 20;
   std::byte* at_least(std::size_t bytes) {
     if (bytes > bytes_) {
@@ -46,7 +46,7 @@ class LandingPlace {
 class DeviceArrays {
  public:
   DeviceArrays() = default;
-  // contents: arrays as long as what a load puts into them.
+  // contents: arrays as long as a load fills them.
   DeviceArrays(StagingBuffers& contents, const KernelOptions& options) {
     const OnDemand& where = options.on_demand;
     const bool on_demand = has_memory_on_demand() && empty_bytes(contents, where.array) >= where.room;
@@ -60,7 +60,7 @@ class DeviceArrays {
       if (on_demand && bytes >= where.array && loaded < bytes) {
         memory_.push_back(make_device_memory_on_demand(bytes, loaded));
       } else {
-        // Never empty: a null pointer would be taken for an array that is not there.
+        // Never empty: a null pointer means an absent array.
         memory_.push_back(make_device_memory(std::max(bytes, sizeof(Element))));
       }
       pointer = static_cast<Element*>(memory_.back().get());
@@ -72,8 +72,8 @@ class DeviceArrays {
 
   const DeviceView& view() const { return view_; }
 
-  // Copies what belongs to the state, as far as it is in use, into the staging's vectors. `counters`: those of the
-  // device. The copies wait for none but the stream, and are waited for together.
+  // Copies the used part of the state into the staging's vectors. `counters`: those of the device. All copies wait for
+  // the stream, and the call waits for all of them together.
   void download(StagingBuffers& staging, const Counters& counters, cudaStream_t stream, LandingPlace& landing) const {
     static_cast<Extents&>(staging) = in_use(view_, counters);
     DeviceView pointers = view_;
@@ -112,7 +112,7 @@ class GpuBackend final : public KernelBackend {
     for (Event& event : end_) event = make_event();
     std::uninitialized_fill_n(counters(), kInFlight, Counters{});
   }
-  // Nothing is given back that the device still uses.
+  // Nothing is freed while the device uses it.
   ~GpuBackend() override {
     static_cast<void>(cudaSetDevice(options_.device));
     static_cast<void>(cudaStreamSynchronize(stream_.get()));
@@ -131,9 +131,9 @@ class GpuBackend final : public KernelBackend {
     take(std::move(load));
   }
 
-  // Starts the span and returns. Whether more capacity is wanted is read from what the counters were kInFlight calls
-  // ago: by then they have nearly always arrived, and the answer does not depend on how fast the device is, so two runs
-  // enlarge their arrays at the same places and have the same bits.
+  // Starts the span and returns. The counters of kInFlight calls ago decide whether capacity must grow. They have
+  // nearly always arrived, and the answer does not depend on the device's speed. So two runs enlarge their arrays at
+  // the same places and have the same bits.
   void run(Span span) override {
     use_device();
     if (span.contains(Stage::skin)) load_.forget_skins();
@@ -152,7 +152,7 @@ class GpuBackend final : public KernelBackend {
       CUTPROOF_CUDA(cudaEventRecord(begin_.get(), stream_.get()));
       enqueue_span(launcher, device_.view(), load_.plan, span, [](Stage) {});
       finish(span);
-      CUTPROOF_CUDA(cudaStreamSynchronize(stream_.get()));  // the launcher's temporary memory goes with it
+      CUTPROOF_CUDA(cudaStreamSynchronize(stream_.get()));  // the launcher's temporary memory is freed with it
       return;
     }
     const auto key = std::pair(static_cast<int>(span.first), static_cast<int>(span.last));
@@ -207,7 +207,7 @@ class GpuBackend final : public KernelBackend {
   }
 
  private:
-  // Which device is in use is a thread's own.
+  // Each thread has a current device of its own.
   void use_device() const { in_use(options_); }
   static const KernelOptions& in_use(const KernelOptions& options) {
     CUTPROOF_CUDA(cudaSetDevice(options.device));
@@ -216,7 +216,7 @@ class GpuBackend final : public KernelBackend {
   void take(Load load) {
     CUTPROOF_CUDA(cudaStreamSynchronize(stream_.get()));
     graphs_.clear();
-    device_ = DeviceArrays();  // gives the old memory back before the new is asked for
+    device_ = DeviceArrays();  // frees the old memory before the new is allocated
     device_ = DeviceArrays(load.staging, options_);
     load_ = std::move(load);
     runs_ = 0;
@@ -225,10 +225,10 @@ class GpuBackend final : public KernelBackend {
   std::size_t slot() const { return static_cast<std::size_t>(runs_ % kInFlight); }
   std::size_t last() const { return static_cast<std::size_t>((runs_ - 1) % kInFlight); }
 
-  // [kInFlight] of the last runs, in turn.
+  // [kInFlight] of the last runs, cyclically.
   Counters* counters() const { return static_cast<Counters*>(counters_.get()); }
 
-  // The counters come back on their own.
+  // The counters arrive asynchronously.
   void finish(Span span) {
     CUTPROOF_CUDA(cudaMemcpyAsync(&counters()[slot()], device_.view().counters, sizeof(Counters),
                                   cudaMemcpyDeviceToHost, stream_.get()));

@@ -1,5 +1,5 @@
-// The work of a frame, written down once for every launcher: which kernels run, in which order, and under which
-// condition. No size is known here; all of them live in DeviceView::counters.
+// The work of a frame, defined once for every launcher: kernels, order, conditions. Sizes are not known here; all are
+// in DeviceView::counters.
 #pragma once
 #include "gpu/kernels/detect.cuh"
 #include "gpu/kernels/expand.cuh"
@@ -15,12 +15,12 @@
 
 namespace cutproof::gpu {
 
-// A span of a whole frame finds the groups that the frame before has made, and makes those that the next frame needs.
-// (Behind a cut there is a condition anyway, so none is needed in front of the step.) Any other span makes groups where
-// its step needs them. Load::needs_groups() says whether groups have to be made first: before the first whole frame,
-// and after any other span (step/groups.cuh, enqueue_groups_if_stale).
+// A span of a whole frame uses the groups that the previous frame made, and makes those of the next frame. (A cut has a
+// condition anyway, so the step needs none in front.) Any other span makes groups where its step needs them.
+// Load::needs_groups() says whether groups must be made first: before the first whole frame, and after any other span
+// (step/groups.cuh, enqueue_groups_if_stale).
 //
-// `mark` is called with each stage before its work is handed over (a launcher that works at once can take times).
+// `mark` is called with each stage before its work is launched; a synchronous launcher can time stages by it.
 template <class Launcher, class Mark>
 void enqueue_span(Launcher& launcher, const DeviceView& w, const Plan& plan, Span span, Mark mark) {
   if (span.contains(Stage::step)) {
@@ -31,11 +31,10 @@ void enqueue_span(Launcher& launcher, const DeviceView& w, const Plan& plan, Spa
   }
   const bool clusters = span.contains(Stage::split) || span.contains(Stage::merge) || span.contains(Stage::expand);
   const bool skin = span.contains(Stage::skin);
-  // In a whole frame vertices are placed without waiting for the groups of the next frame.
+  // A whole frame places vertices without waiting for the next frame's groups.
   const bool places_at_once = span.is_whole_frame() && plan.skin;
-  // In a small load vertices are placed beside detection, as if nothing were cut. After a cut they are placed again,
-  // and in a small load nothing waits for that. (If the nearer ends of edges go, detection computes centres of clusters
-  // too, so vertices wait.)
+  // A small load places vertices during detection, as if nothing were cut, and again after a cut; nothing waits for the
+  // first time. (With RemovedEnds::nearer detection computes centres of clusters too, so vertices wait.)
   const bool places_early = places_at_once && plan.detection && !plan.nearer &&
                             w.particles <= step_detail::kMostByRows && launcher.overlaps();
   const auto detect = [&](Launcher& on) {
@@ -51,14 +50,14 @@ void enqueue_span(Launcher& launcher, const DeviceView& w, const Plan& plan, Spa
     detect(launcher);
   }
   if (clusters || skin) {
-    // One condition for all that a frame without a cut does not need: each costs as much as ten launches. (A first skin
-    // needs only the cells; the rest finds no body that was cut.)
+    // One condition for everything that only a cut needs, because a condition costs as much as ten launches. (A first
+    // skin needs only the cells; the other kernels find no body that was cut.)
     launcher.if_nonzero(&w.counters->changing, [&](Launcher& inner) {
       if (span.contains(Stage::split)) {
         mark(Stage::split);
         enqueue_components(inner, w, plan);
       }
-      // Which particles there are is known from here on, and cells ask for nothing else.
+      // Cells depend only on which particles live, and that is final here.
       const auto change_clusters = [&](Launcher& on) {
         const bool merges = span.contains(Stage::merge) && plan.merge;
         const auto rest_frames = [&](Launcher& own) {

@@ -28,7 +28,7 @@ class HostBackend final : public KernelBackend {
     if (wants_capacity(view_, load_.staging.counters.front())) take(load_.enlarged(snapshot(), options_));
     report_ = {};
     if (span.contains(Stage::skin)) load_.forget_skins();
-    // Work is done when it is handed over, so the time between two marks is that of the stage between them.
+    // Work is synchronous, so the time between two marks is that of the stage between them.
     const auto begin = Clock::now();
     auto since = begin;
     int stage = -1;

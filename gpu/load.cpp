@@ -14,7 +14,7 @@ Load::Load(std::vector<Setup> bodies, const std::vector<State>& states, const Ke
 
 Load Load::enlarged(const std::vector<State>& states, const KernelOptions& options) {
   Load larger(std::move(setups), states, options, Capacity{2 * capacity.factor});
-  // A state has only the sum of its particles' impulses, which spread over them would be rounded anew.
+  // A state has only the sum of its particles' impulses; distributing the sum over particles would round anew.
   larger.staging.impulse = std::move(staging.impulse);
   return larger;
 }

@@ -1,4 +1,4 @@
-// What a backend keeps of the bodies that it has loaded, wherever its kernels run.
+// A backend's record of its loaded bodies, wherever its kernels run.
 #pragma once
 #include <cstddef>
 #include <optional>
@@ -12,15 +12,15 @@
 
 namespace cutproof::gpu {
 
-// gpu: how the work of a span is started. All give the same bits.
+// gpu: how the work of a span is started. All paths give the same bits.
 enum class Path {
   graph,  // kernels and conditions as one CUDA graph
   eager,  // kernels one by one, waiting for each condition
 };
 
-// gpu: arrays of at least `array` bytes have memory only where they are touched, by pages of 2 MiB, if a load leaves at
-// least `room` bytes of them empty (both small for tests). CUDA takes memory for pages by pieces of 128 MiB: the last
-// of a load, and one that a frame begins, may be taken for next to nothing.
+// gpu: arrays of at least `array` bytes get memory where they are touched, in pages of 2 MiB, if a load leaves at least
+// `room` bytes of them empty (both small for tests). CUDA allocates pages in pieces of 128 MiB. The last piece of a
+// load may stay nearly empty, as may a piece that a frame begins.
 struct OnDemand {
   std::size_t array = std::size_t{4} << 20;
   std::size_t room = std::size_t{256} << 20;
@@ -29,36 +29,36 @@ struct OnDemand {
 struct KernelOptions {
   SplitMethod split = SplitMethod::blocks;
   Path path = Path::graph;
-  Capacity capacity;  // at load; a backend doubles it when it must (for tests)
+  Capacity capacity;  // at load; backends double it when needed (for tests)
   OnDemand on_demand;
   int device = 0;  // gpu: its number
-  // gpu, for tests: a byte that fills all memory before anything is put into it.
+  // gpu, for tests: a byte that fills all memory before use.
   std::optional<int> fill;
 };
 
 struct Load {
   std::vector<Setup> setups;
   Capacity capacity;
-  StagingBuffers staging;  // contents only; where kernels work on them, the backend allocates the rest
+  StagingBuffers staging;  // contents only; backends with memory of their own allocate the rest
   Plan plan;
-  KnownSkins skins;  // of the last skin stage, as far as snapshots have asked for them
+  KnownSkins skins;  // of the last skin stage, as far as snapshots requested them
 
   Load() = default;
-  // Throws what make_contents throws.
+  // Throws as make_contents does.
   Load(std::vector<Setup> bodies, const std::vector<State>& states, const KernelOptions& options, Capacity with);
 
-  // The same bodies, now in these states, which are what `staging` holds, with twice the capacity. Leaves this load
-  // without its setups.
+  // The same bodies in these states, which `staging` contains, with twice the capacity. Leaves this load without
+  // setups.
   Load enlarged(const std::vector<State>& states, const KernelOptions& options);
-  // To be called before a skin stage.
+  // Call before a skin stage.
   void forget_skins() { skins.assign(setups.size(), std::nullopt); }
-  // To be called before each span is run. Whether groups have to be made first (frame.h).
+  // Call before each span is run. Whether groups must be made first (frame.h).
   bool needs_groups(Span span) {
     const bool needs = span.is_whole_frame() && !groups_made_;
     groups_made_ = span.is_whole_frame();
     return needs;
   }
-  // As extract_states; `staging` holds what is to be extracted.
+  // As extract_states; `staging` contains the states.
   std::vector<State> states_of(const std::vector<bool>& wanted) {
     return extract_states(staging, setups, wanted, skins);
   }

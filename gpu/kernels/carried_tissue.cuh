@@ -1,5 +1,5 @@
-// Where clusters carry what rests on their particles and beside them (docs/design/method.md §4 and §8): by which
-// detection and skin tell how far tissue is from the blade that holds it apart.
+// Where clusters carry points at and beside their particles (docs/design/method.md §4 and §8). Detection and skin use
+// it to measure how far tissue is from the blade that separates it.
 #pragma once
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/team.h"
@@ -8,7 +8,7 @@
 
 namespace cutproof::gpu {
 
-inline constexpr int kCenterTeam = 32;  // lanes that find where a cluster is
+inline constexpr int kCenterTeam = 32;  // lanes that find a cluster's centre
 
 // DeviceView::center of a cluster from the present displacements.
 template <class Block>
@@ -16,7 +16,7 @@ CUTPROOF_DEVICE void recenter(const DeviceView& w, const Team<Block, kCenterTeam
   const BodyConstants& body = w.body[w.slot_body[s]];
   const int* const members = w.members + w.slot_begin[s];
   const Float3 base = xyz(w.displacement[members[0]]);
-  // Σ w (d - base), Σ w (X - T), which is zero but for the rounding of T, and Σ w.
+  // Σ w (d - base), Σ w (X - T) (the rounding of T), and Σ w.
   typename Team<Block, kCenterTeam>::template Sums<7> sums;
   struct Member {
     Float4 now;
@@ -48,11 +48,11 @@ CUTPROOF_DEVICE void recenter(const DeviceView& w, const Team<Block, kCenterTeam
   w.center[s] = base + (1.0f / total.v[6]) * (moved - turned);
 }
 
-// The mean over p's clusters of (t - T) + (R - I)(X - T) for what rests at X = X_p + arm, as displacement from X.
-// Without a cluster that of p.
+// The mean over p's clusters of (t - T) + (R - I)(X - T) for a point that rests at X = X_p + arm, as displacement from
+// X. Without a cluster p's displacement.
 CUTPROOF_DEVICE inline Float3 carried(const DeviceView& w, const BodyConstants& body, int p, Float3 arm) {
-  // Relative to where the first cluster puts it, so that summing costs no digits of d. (Not to the owner: where a
-  // blade has pushed it away, that is far from what all of them say.)
+  // Relative to where the first cluster puts the point, so that summing costs no digits of d. (A blade may have pushed
+  // the owner far from where its clusters put the point.)
   Float3 base = xyz(w.displacement[p]), sum;
   const Coordinates at = coordinates(body, w.node[p]);
   struct Holder {
@@ -60,7 +60,7 @@ CUTPROOF_DEVICE inline Float3 carried(const DeviceView& w, const BodyConstants& 
     Float3 center;
     Matrix3 rotation;
   };
-  // Several at once: one by one, each would wait for what the one before has asked for.
+  // Several at once: one by one, each read would wait for the previous one.
   constexpr int kAtOnce = 4;
   const int clusters = w.membership_count[p], begin = w.membership_begin[p];
   CUTPROOF_ROLLED for (int first = 0; first < clusters; first += kAtOnce) {

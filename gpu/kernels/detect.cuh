@@ -1,18 +1,18 @@
-// Stage detect (method.md §4): which particles a cut takes out of the tissue. Every particle is judged first, by what
-// was alive before the stage; then all of them go at once.
+// Stage detect (method.md §4): which particles a cut removes from the tissue. Every particle is judged by the tissue
+// before the stage; then all are removed at once.
 //
-// Rounding, with u = 2^-24, of the decisions compared with exact arithmetic on the same stored numbers:
-// - distance: d_i > epsilon h may come out either way where |d_i - epsilon h| <= 8 u (1 + epsilon) h. An edge is h e
-//   plus a difference of displacements, so where the body is does not matter: u for the difference, u for the sum, 1.5
-//   u for the squares and their sum, and u each for h, epsilon, their product and its square. Where one end of
-//   each edge goes, a fate may also come out either way where that holds of an edge of a neighbour, or where an end is
-//   as near to the plane of the blade as places are rounded (as for geometric), or, by the nearer end, where how far
-//   the clusters carry both ends from it differs from the limit by no more than both are rounded: as skin vertices,
-//   and as places.
-// - geometric: distances to the blade are between places in the body, so they carry 10 u |x| + 8 u |edge|: u each for
-//   h, X, X + d and the stored edge, and for x - edge the difference, the stored axes and the products with them. Ties
-//   go to removal, so the reach is longer by swept_slack(), which is more than that: what is within the reach always
-//   goes, and what is farther by up to twice the slack may go.
+// Rounding of decisions, compared with exact arithmetic on the same stored numbers (u = 2^-24):
+// - distance: d_i > epsilon h is inconclusive where |d_i - epsilon h| <= 8 u (1 + epsilon) h. An edge is h e plus a
+//   difference of displacements, so the body's place does not matter. The sum has u for the difference, u for the sum,
+//   and 1.5 u for the squares and their sum. It has u each for h, epsilon, their product and its square.
+// - distance, where one end of each edge is removed: a fate is also inconclusive if this holds of a neighbour's edge.
+//   So it is where an end is as near to the blade's plane as places are rounded (as for geometric). By the nearer end
+//   it also is where the distances to which the clusters carry both ends differ from the limit by no more than their
+//   rounding: as skin vertices, and as places.
+// - geometric: distances to the blade are between places in the body, so they carry 10 u |x| + 8 u |edge|. These are u
+//   each for h, X, X + d and the stored edge; and for x - edge the difference, the stored axes and the products with
+//   them. Ties are removed, so the reach is longer by swept_slack(), which exceeds that. All within the reach is
+//   removed; particles farther by up to twice the slack may be.
 #pragma once
 #include <type_traits>
 
@@ -27,8 +27,8 @@ namespace cutproof::gpu {
 
 namespace detect_detail {
 
-// DeviceView::particle_flag. kContested: the particle has open edges of which nobody has chosen an end yet; whether it
-// loses one of them is asked when all have been counted, and when it is known where clusters are.
+// DeviceView::particle_flag. kContested: the particle has open edges whose removed end is not yet chosen. The choice
+// follows when all open edges are counted and centres of clusters are known.
 enum : unsigned char { kStays = 0, kGoes = 1, kWentBefore = 2, kContested = 3 };
 
 inline constexpr float kRounding = 0x1p-24f;
@@ -37,7 +37,7 @@ CUTPROOF_DEVICE inline int body_index(const DeviceView& w, int p) { return w.bod
 
 CUTPROOF_DEVICE inline bool detects(const DeviceView& w, int b) { return w.body[b].needs_detection && running(w, b); }
 
-// The code of particles that detection removes in the frame in progress.
+// The removal code of this frame's detection.
 CUTPROOF_DEVICE inline int removal_code(const DeviceView& w, int b) { return 2 * w.frame[b] + 2; }
 
 // visit(direction, squared length, other end) for the edges of G at p. Each is evaluated from its lower to its upper
@@ -67,8 +67,8 @@ CUTPROOF_DEVICE inline float greatest_squared_edge(const DeviceView& w, const Bo
 
 // ---- one end of each edge that is too long
 
-// The open edges of a particle, as they stand in DeviceView::particle_scratch for its neighbours: how many, and the
-// directions of those of which the blade does not choose an end, and of which it takes the nearer one.
+// A particle's open edges, as DeviceView::particle_scratch shows them to its neighbours: their number, the directions
+// in which the blade chooses no end, and those in which it takes the nearer end.
 struct OpenEdges {
   int count = 0;
   unsigned contested = 0, crossing = 0;
@@ -84,21 +84,20 @@ CUTPROOF_DEVICE inline bool is_negative(const DeviceView& w, const BodyConstants
   return height_over(plane, rest_position(body, w.node[p]) + xyz(w.displacement[p])) < 0;
 }
 
-// How far the clusters carry a particle from the plane.
+// Distance from the plane to which the clusters carry a particle.
 CUTPROOF_DEVICE inline float carried_from(const DeviceView& w, const BodyConstants& body, const Plane& plane, int p) {
   return fabsf(height_over(plane, rest_position(body, w.node[p]) + carried(w, body, p, {0, 0, 0})));
 }
 
-// By the nearer end, of an edge with ends on both sides of the plane: whether that on its negative side goes. Both ends
-// ask with the same numbers.
+// Of an edge across the plane, by the nearer end: whether its end on the negative side is removed. Both ends ask with
+// the same numbers.
 CUTPROOF_DEVICE inline bool negative_goes(const DeviceView& w, const BodyConstants& body, const Plane& plane,
                                           int negative, int positive) {
   const float limit = static_cast<float>(kNearerBy) * body.h;
   return carried_from(w, body, plane, negative) <= carried_from(w, body, plane, positive) + limit;
 }
 
-// What becomes of a particle that has an edge longer than the root of `limit`. Where clusters will be asked about it,
-// they are marked.
+// The fate of a particle with an edge longer than the root of `limit`. Marks the clusters whose centres decide it.
 template <bool kNearer, class Block>
 CUTPROOF_DEVICE unsigned char flag_of_open(Block& block, const DeviceView& w, const BodyConstants& body, int b, int p,
                                            float limit) {
@@ -128,8 +127,8 @@ CUTPROOF_DEVICE unsigned char flag_of_open(Block& block, const DeviceView& w, co
   return goes ? kGoes : (open.contested | open.crossing) != 0 ? kContested : kStays;
 }
 
-// Whether the particle loses one of the edges that were left: of one that crosses the blade's plane it is the end that
-// goes; of another it has more open edges than the other end, or as many and is the lower.
+// Whether the particle loses one of the remaining edges. If the edge crosses the blade's plane, this is the removed
+// end. Otherwise it has more open edges than the other end, or as many and the lower number.
 template <bool kNearer>
 CUTPROOF_DEVICE inline bool loses(const DeviceView& w, int b, int p) {
   const BodyConstants& body = w.body[b];
@@ -163,7 +162,7 @@ CUTPROOF_DEVICE inline Float3 in_axes(const Axes& axes, Float3 v) {
   return {dot(v, axes.along), dot(v, axes.back), dot(v, axes.normal)};
 }
 
-// How far c lies beyond [low, high], with its sign.
+// Signed distance of c beyond [low, high].
 CUTPROOF_DEVICE inline float beyond(float c, float low, float high) {
   return c < low ? c - low : c > high ? c - high : 0.0f;
 }
@@ -176,11 +175,12 @@ CUTPROOF_DEVICE inline Float3 from_rectangle(Rectangle r, Float3 c) {
   return {beyond(c.x, -r.half, r.half), beyond(c.y, 0.0f, r.depth), c.z};
 }
 
-// The least distance between a point and the rectangle while the latter goes along `way`; all in the rectangle's axes.
+// The least distance between a point and the rectangle while the rectangle moves along `way`; all in the rectangle's
+// axes.
 //
-// Half the square of the distance at time t in [0, 1] is convex with the slope -way · from_rectangle(c - t way), which
-// is linear between the times at which a coordinate enters or leaves its range. Those times narrow down where the
-// slope changes its sign, until it is linear there and its zero can be written down.
+// Half the squared distance at time t in [0, 1] is convex with the slope -way · from_rectangle(c - t way). The slope is
+// linear between the times at which a coordinate enters or leaves its range. Those times narrow down the change of its
+// sign to a linear part, whose zero has a formula.
 CUTPROOF_DEVICE inline float distance_to_sweep(Rectangle r, Float3 c, Float3 way) {
   const auto slope = [&](float t) { return -dot(way, from_rectangle(r, c - t * way)); };
   float low = 0, high = 1, t = 0;
@@ -193,7 +193,7 @@ CUTPROOF_DEVICE inline float distance_to_sweep(Rectangle r, Float3 c, Float3 way
     const float bounds[4] = {-r.half, r.half, 0, r.depth};
     for (int k = 0; k < 4; ++k) {
       const float speed = k < 2 ? way.x : way.y;
-      const float crossing = ((k < 2 ? c.x : c.y) - bounds[k]) / speed;  // not in (low, high) if it is never crossed
+      const float crossing = ((k < 2 ? c.x : c.y) - bounds[k]) / speed;  // outside (low, high) if never crossed
       if (!(crossing > low && crossing < high)) continue;
       const float here = slope(crossing);
       if (here < 0) {
@@ -209,7 +209,7 @@ CUTPROOF_DEVICE inline float distance_to_sweep(Rectangle r, Float3 c, Float3 way
   return norm(from_rectangle(r, c - t * way));
 }
 
-// A turn about `axis` by an angle in [0, π], given by its cosine and sine.
+// A rotation about `axis` by an angle in [0, π], given by its cosine and sine.
 struct Turn {
   Float3 axis;
   float cosine, sine;
@@ -249,7 +249,8 @@ CUTPROOF_DEVICE inline Turn turn_between(const Axes& from, const Axes& to) {
   if (turn.cosine > 0) {
     if (length > 0) turn.axis = (1.0f / length) * twice_sine;
   } else {
-    // Near half a turn the sine says little: (R + Rᵀ) / 2 = cos + (1 - cos) axis axisᵀ, whose longest column it is.
+    // Near half a turn the sine is inaccurate. The axis is the longest column of (R + Rᵀ) / 2 = cos + (1 - cos) axis
+    // axisᵀ.
     const int k = diagonal.x >= diagonal.y && diagonal.x >= diagonal.z ? 0 : diagonal.y >= diagonal.z ? 1 : 2;
     const auto symmetric = [&](int row) {
       return (entry(row, k) + entry(k, row)) / 2.0f - (row == k ? turn.cosine : 0.0f);
@@ -264,21 +265,21 @@ CUTPROOF_DEVICE inline Turn turn_between(const Axes& from, const Axes& to) {
   return turn;
 }
 
-// By how much the reach is lengthened for ties to go to removal, given the length of |x| + |edge|.
+// Extension of the reach that removes ties, given the length of |x| + |edge|.
 CUTPROOF_DEVICE inline float swept_slack(float reach, float places) {
   return 16.0f * kRounding * reach + 12.0f * kRounding * places;
 }
 
-// Whether the plate, turning while its edge goes along `way`, comes as near as `reach` to x. A part of the move counts
-// as a translation, from which the plate is never farther than its radius times the angle of that part; parts for which
-// this is more than h / 25 are halved where it matters.
+// Whether the plate comes as near as `reach` to x while it rotates and its edge moves along `way`. A part of the move
+// counts as a translation; the plate is never farther from it than its radius times the part's angle. Where it matters,
+// parts with more than h / 25 are halved.
 CUTPROOF_DEVICE inline bool turning_comes_near(const BodyConstants& body, const PoseF& from, const Axes& axes,
                                                const Axes& last, Float3 way, float reach, Float3 x) {
   constexpr int kMostHalvings = 24;
   const Rectangle rectangle = {body.blade_length / 2.0f, body.blade_depth};
   const float radius = sqrtf(rectangle.half * rectangle.half + rectangle.depth * rectangle.depth);
   const Turn turn = turn_between(axes, last);
-  // The binary tree of parts in depth-first order: at `level` there are 2^level parts, of which this is `part`.
+  // The binary tree of parts in depth-first order; of the 2^level parts at `level` this is `part`.
   int level = 0;
   unsigned part = 0;
   for (;;) {
@@ -310,8 +311,8 @@ CUTPROOF_DEVICE inline bool turning_comes_near(const BodyConstants& body, const 
 
 CUTPROOF_DEVICE inline bool same(Float3 a, Float3 b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
-// Whether the blade comes as near as max(thickness, h, d_i) / 2 to a particle at x in this move: whichever edge it
-// crosses then loses an end, also where tissue is stretched.
+// Whether the blade comes as near as max(thickness, h, d_i) / 2 to a particle at x in this move. So each edge that it
+// crosses loses an end, stretched tissue included.
 CUTPROOF_DEVICE inline bool is_swept(const BodyConstants& body, const MoveF& move, float longest_edge, Float3 x) {
   const PoseF &from = move.from, &to = move.to;
   const Axes axes = {from.along, from.back, cross(from.along, from.back)};
@@ -330,7 +331,7 @@ CUTPROOF_DEVICE inline bool is_swept(const BodyConstants& body, const MoveF& mov
     arc = radius * 3.1416f * sqrtf((dot(a, a) + dot(b, b) + dot(c, c)) / 8.0f);
   }
 
-  // The sweep's bounding box spares most particles the rest.
+  // A bounding box spares most particles the exact distance.
   const Float3 way = to.edge - from.edge;
   const Float3 at = in_axes(axes, x - from.edge), moved = in_axes(axes, way);
   const float margin = reach + arc;
@@ -347,8 +348,7 @@ CUTPROOF_DEVICE inline bool is_swept(const BodyConstants& body, const MoveF& mov
 
 // ---- strain
 
-// The eigenvalues of a symmetric matrix, which is left on the diagonal of `n`, and its eigenvectors, the columns of
-// `v`: cyclic Jacobi.
+// Cyclic Jacobi of a symmetric matrix: eigenvalues on the diagonal of `n`, eigenvectors in the columns of `v`.
 CUTPROOF_DEVICE inline void diagonalise(float (&n)[3][3], float (&v)[3][3]) {
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) v[row][column] = row == column ? 1.0f : 0.0f;
@@ -376,10 +376,10 @@ CUTPROOF_DEVICE inline void diagonalise(float (&n)[3][3], float (&v)[3][3]) {
 }
 
 // The greatest stretch of the deformation gradient A A0⁺, with A0 = Σ w r rᵀ (r = X - T) and A = A0 + B, B = Σ w e rᵀ
-// (e: displacement less its mean). Directions without extent are left out, as the pseudo-inverse does. Not finite if B
+// (e: displacement less its mean). As with the pseudo-inverse, directions without extent are left out. Not finite if B
 // is not.
 CUTPROOF_DEVICE inline float greatest_stretch(const float (&a0)[3][3], const float (&b)[3][3]) {
-  // An eigenvalue of a flat cluster is a sum of exact zeros, because connected ones are flat along the axes only.
+  // An eigenvalue of a flat cluster is a sum of exact zeros: connected clusters are flat only along axes.
   constexpr float kNoExtent = 0x1p-22f;
   float n[3][3], v[3][3];
   for (int row = 0; row < 3; ++row) {
@@ -408,12 +408,11 @@ CUTPROOF_DEVICE inline float greatest_stretch(const float (&a0)[3][3], const flo
   return sqrtf(fmaxf(c[0][0], fmaxf(c[1][1], c[2][2])));
 }
 
-inline constexpr int kStrainTeam = 32;  // lanes that look at a cluster
+inline constexpr int kStrainTeam = 32;  // lanes of a cluster
 
 }  // namespace detect_detail
 
-// slot_flag: clusters that are stretched too much in some direction. The criterion that the paper rejects (its Fig. 7),
-// kept as a baseline.
+// slot_flag: clusters stretched too much in some direction. AFCC rejects this criterion (Fig. 7); it is a baseline.
 template <class Block>
 CUTPROOF_DEVICE void flag_strained_clusters_kernel(Block& block, DeviceView w) {
   using namespace detect_detail;
@@ -469,8 +468,8 @@ CUTPROOF_DEVICE void flag_strained_clusters_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(flag_strained_clusters_kernel);
 
-// DeviceView::center, of the clusters that carry an end of an edge whose nearer end goes. (What an earlier detection of
-// the same frame has marked may be among them.)
+// DeviceView::center of the clusters that carry an end of an edge whose nearer end is removed. (They may include
+// clusters that an earlier detection of this frame marked.)
 template <class Block>
 CUTPROOF_DEVICE void recenter_asked_clusters_kernel(Block& block, DeviceView w) {
   using namespace detect_detail;
@@ -482,8 +481,7 @@ CUTPROOF_DEVICE void recenter_asked_clusters_kernel(Block& block, DeviceView w) 
 }
 CUTPROOF_KERNEL(recenter_asked_clusters_kernel);
 
-// Judges the particles of every body, but those of geometric cuts. kNearer: of some body the nearer end of an edge
-// goes.
+// Judges the particles of every body without a geometric cut. kNearer: some body removes the nearer ends of edges.
 template <bool kNearer, class Block>
 CUTPROOF_DEVICE void flag_particles_kernel(Block& block, const DeviceView& w) {
   using namespace detect_detail;
@@ -542,7 +540,7 @@ CUTPROOF_DEVICE void flag_swept_particles_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(flag_swept_particles_kernel);
 
-// What a detection earlier in this frame has removed leaves the list, which this one replaces.
+// Particles that an earlier detection of this frame removed leave the list; this detection writes it anew.
 template <bool kNearer, class Block>
 CUTPROOF_DEVICE void remove_particles_kernel(Block& block, const DeviceView& w) {
   using namespace detect_detail;
@@ -577,7 +575,7 @@ template <class Launcher>
 void enqueue_detect(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   using namespace detect_detail;
   if (plan.strain) launcher.teams(flag_strained_clusters_kernel_object{}, kStrainTeam, w.slots_expected, w);
-  // Only with it do these kernels know of the nearer end: code for what happens to few particles is registers of all.
+  // Only these instances contain code for the nearer end: code for few particles takes registers of all.
   const auto by_ends = [&](auto nearer) {
     launcher.items(flag_particles_kernel_object<nearer.value>{}, w.particles, w);
     if (plan.geometric) launcher.items(flag_swept_particles_kernel_object{}, w.particles, w);

@@ -1,9 +1,9 @@
-// Expand (method.md §7): clusters take in particles beyond the edges of G that leave them. Bodies that expand do so
-// until edge_cover has once been done, or, under `published`, in every frame that cuts.
+// Expand (method.md §7): clusters take in particles beyond the edges of G that leave them. Bodies expand until
+// edge_cover has been done once or, under `published`, in every frame that cuts.
 //
-// An addition is a pair (cluster, particle). All of them are found on the clusters as they are at the beginning, then
-// carried out at once: enlarged lists go behind the present ones, and the memberships of all particles are laid out
-// again. Only when it is known that everything fits is anything written.
+// An addition is a pair (cluster, particle). All additions are found on the initial clusters, then carried out at once.
+// Enlarged lists go behind the present ones, and all memberships are laid out anew. Nothing is written until everything
+// is known to fit.
 #pragma once
 #include <cstdint>
 
@@ -16,7 +16,7 @@
 
 namespace cutproof::gpu {
 
-// After a fault nothing expands: what the faulty stage left may still hold dead particles.
+// After a fault nothing expands: the faulty stage may have left dead particles in clusters.
 CUTPROOF_BOTH inline bool expands_now(const DeviceView& w, int b) {
   if (!cut_now(w, b) || w.counters->fault != 0) return false;
   const ExpandRule rule = w.body[b].expand_rule;
@@ -59,8 +59,8 @@ CUTPROOF_DEVICE void begin_expand_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(begin_expand_kernel);
 
-// edge_cover: for every edge of G that no cluster contains, the smallest cluster of its ends, of equal ones the one
-// with the lowest number (that is, slot), takes in the other end.
+// edge_cover: for every edge of G that no cluster contains, the smallest cluster at its ends takes in the other end; of
+// equally small ones the lowest number (slot).
 template <class Block>
 CUTPROOF_DEVICE void cover_edges_kernel(Block& block, DeviceView w) {
   for (int64_t i = block.first(); i < w.particles; i += block.stride()) {
@@ -87,14 +87,14 @@ CUTPROOF_DEVICE void cover_edges_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(cover_edges_kernel);
 
-// published: a cluster that shares no particle with another takes in the outside ends of the edges that leave it.
+// published: a cluster that shares no particle takes in the outside ends of the edges that leave it.
 template <class Block>
 CUTPROOF_DEVICE void free_lone_clusters_kernel(Block& block, DeviceView w) {
   for (int s = block.index(); s < w.counters->slots_used; s += block.count()) {
     const int b = w.slot_body[s];
     if (w.slot_size[s] == 0 || w.body[b].expand_rule != ExpandRule::published || !expands_now(w, b)) continue;
     const int* members = w.members + w.slot_begin[s];
-    // Nearly every cluster shares one of the first particles that are looked at.
+    // Nearly every cluster shares one of its first particles.
     bool shared = false;
     for (int tile = 0; tile < w.slot_size[s] && !shared; tile += block.size()) {
       const int k = tile + block.thread();
@@ -111,8 +111,8 @@ CUTPROOF_DEVICE void free_lone_clusters_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(free_lone_clusters_kernel);
 
-// One layer more for bodies of greater depth: the neighbours in G of additions that share a cluster with them. Those of
-// earlier layers have all theirs already, so nothing is lost by looking at all additions instead of the last ones.
+// One more layer for bodies of greater depth: G-neighbours of additions that share a cluster with them. Additions of
+// earlier layers already have all their neighbours, so examining them too changes nothing.
 template <class Block>
 CUTPROOF_DEVICE void add_layer_kernel(Block& block, DeviceView w) {
   const Counters& c = *w.counters;
@@ -142,7 +142,7 @@ CUTPROOF_DEVICE void check_additions_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(check_additions_kernel);
 
-// A layer is complete. Counters::changed: another one may follow.
+// Completes a layer. Counters::changed: another may follow.
 template <class Block>
 CUTPROOF_DEVICE void end_layer_kernel(Block& block, DeviceView w) {
   if (block.first() != 0) return;
@@ -157,8 +157,8 @@ CUTPROOF_KERNEL(end_layer_kernel);
 
 // --- Carrying out ----------------------------------------------------------------------------------------------------
 
-// By particle: where its memberships began, and how many there will be; the latter then becomes the place where the
-// next one goes. (Not in particle_scratch, which the skin has meanwhile.)
+// By particle: where its memberships began, and their future number, which then becomes the next place to fill. (The
+// skin uses particle_scratch meanwhile.)
 CUTPROOF_BOTH inline int* old_begin(const DeviceView& w) { return w.class_data; }
 CUTPROOF_BOTH inline int* new_count(const DeviceView& w) { return w.class_data + w.particles; }
 CUTPROOF_BOTH inline int old_count(const DeviceView& w, int64_t p) {
@@ -178,7 +178,7 @@ CUTPROOF_DEVICE void note_rows_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(note_rows_kernel);
 
-// The additions of one cluster stand together: [i, end) if there are any that begin at i, else [i, i).
+// The additions of one cluster are adjacent: [i, end) if they begin at i, else [i, i).
 CUTPROOF_DEVICE inline int end_of_additions(const DeviceView& w, int i) {
   const int count = w.counters->additions, s = cluster_of(w.additions[i]);
   if (i > 0 && cluster_of(w.additions[i - 1]) == s) return i;
@@ -208,7 +208,7 @@ CUTPROOF_DEVICE void check_growth_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(check_growth_kernel);
 
-// Memberships are copied aside, because their rows move.
+// Copied aside, because rows of memberships move.
 template <class Block>
 CUTPROOF_DEVICE void copy_memberships_kernel(Block& block, DeviceView w) {
   for (int64_t h = block.first(); h < w.counters->memberships_before; h += block.stride())
@@ -236,8 +236,8 @@ CUTPROOF_DEVICE void add_memberships_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(add_memberships_kernel);
 
-// Rows that grew are sorted, so that no order of execution shows; the other ones stay as they are. Every cluster of a
-// particle that is in more clusters than before needs a new rest frame.
+// Sorts the rows that grew, so that the order of execution does not show. Every cluster of a particle with new clusters
+// needs a new rest frame.
 template <class Block>
 CUTPROOF_DEVICE void finish_rows_kernel(Block& block, DeviceView w) {
   for (int64_t p = block.first(); p < w.particles; p += block.stride()) {
@@ -307,7 +307,7 @@ void enqueue_expand(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   launcher.items(begin_expand_kernel_object{}, 1, w);
   if (plan.edge_cover) launcher.items(cover_edges_kernel_object{}, w.particles, w);
   if (plan.published_expand) launcher.blocks(free_lone_clusters_kernel_object{}, w.slots_expected, kThreads, 0, w);
-  // Most frames that look for additions find none: sorting as many as there is room for would take longest of all.
+  // Most frames find no additions: sorting the whole capacity would take longest of all.
   launcher.if_nonzero(&c->additions, [&](Launcher& some) {
     collect(some);
     some.while_nonzero(&c->changed, [&](Launcher& layer) {

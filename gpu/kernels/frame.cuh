@@ -1,10 +1,9 @@
-// gpu/kernels: the six stages, a file each (the step a folder), and the pieces that they share. Kernels are templates
-// over the Block of launch/block.h and work on the DeviceView of state/device_view.h; what starts those of one stage in
-// their order is its enqueue_…, over a Launcher (launch/launcher.h). Nothing here depends on whether it runs on a
-// device or on the host.
+// gpu/kernels: the six stages, a file each (the step a folder), and shared parts. Kernels are templates over the Block
+// of launch/block.h and work on the DeviceView of state/device_view.h. Each stage has an enqueue_… that starts its
+// kernels in order on a Launcher (launch/launcher.h). Nothing here depends on device or host.
 //
-// This file: what a frame does around its stages: which of them are due, and at its end the order of memberships, the
-// numbers of clusters and the count of frames.
+// This file has the work around the stages: which stages are due, and at the end of a frame the order of memberships,
+// the numbers of clusters and the count of frames.
 #pragma once
 #include "gpu/kernels/sorted_lists.cuh"
 #include "gpu/launch/launcher.h"
@@ -34,8 +33,8 @@ CUTPROOF_DEVICE inline bool is_due(const DeviceView& w, int b, int stage) {
   }
 }
 
-// What a span reports of step and detect: which of them some body has due. By the last block of whichever kernel is the
-// first of the span; the first one has other things to do.
+// A span's report of step and detect: whether some body has them due. Written by the last block of the span's first
+// kernel; the first block has other work.
 template <class Block>
 CUTPROOF_DEVICE void begin_span(Block& block, const DeviceView& w, Span span) {
   if (block.index() != block.count() - 1) return;
@@ -54,8 +53,7 @@ CUTPROOF_DEVICE void begin_span_kernel(Block& block, const DeviceView& w, Span s
 }
 CUTPROOF_KERNEL(begin_span_kernel);
 
-// The same of all later stages, once it is known what detect has removed, and what the conditions of a span ask for.
-// One block.
+// The report of all later stages, once detection is complete; and the conditions of a span. One block.
 template <class Block>
 CUTPROOF_DEVICE void note_cuts_kernel(Block& block, const DeviceView& w, Span span) {
   if (block.index() != 0) return;
@@ -83,9 +81,8 @@ CUTPROOF_DEVICE void note_cuts_kernel(Block& block, const DeviceView& w, Span sp
 }
 CUTPROOF_KERNEL(note_cuts_kernel);
 
-// Split and merge rename memberships in place. Before anything is summed over them again they are brought into the
-// order that a load gives them, so that sums have the same bits however often a state was loaded on the way. A warp for
-// each tile of particles.
+// Split and merge rename memberships in place. This restores the order of a load before anything is summed over them.
+// So sums have the same bits however often a state was loaded on the way. A warp for each tile of particles.
 template <class Block>
 CUTPROOF_DEVICE void sort_memberships_kernel(Block& block, const DeviceView& w) {
   const Team<Block, kParticleTile> team(block);
@@ -101,10 +98,10 @@ CUTPROOF_DEVICE void sort_memberships_kernel(Block& block, const DeviceView& w) 
 }
 CUTPROOF_KERNEL(sort_memberships_kernel);
 
-// Slots that a block numbers; it counts those before them by itself.
+// Slots numbered by one block, which itself counts the preceding ones.
 inline constexpr int kSlotRun = 8192;
 CUTPROOF_BOTH inline int64_t slot_runs(int64_t slots) { return (slots + kSlotRun - 1) / kSlotRun; }
-// Numbers in the order of slots: of each body from 0, whose slots interleave once clusters have split.
+// Numbers follow slots, in each body from 0. Slots of bodies interleave once clusters have split.
 template <class Block>
 CUTPROOF_DEVICE void number_slots_kernel(Block& block, const DeviceView& w) {
   const int slots = w.counters->slots_used, runs = static_cast<int>(slot_runs(slots));
@@ -121,7 +118,6 @@ CUTPROOF_DEVICE void number_slots_kernel(Block& block, const DeviceView& w) {
 }
 CUTPROOF_KERNEL_THREADS(number_slots_kernel, kListThreads);
 
-// The frame counts up.
 template <class Block>
 CUTPROOF_DEVICE void end_frame_kernel(Block& block, DeviceView w) {
   for (int64_t b = block.first(); b < w.bodies; b += block.stride()) {

@@ -1,4 +1,4 @@
-// The plane by which detection and skin tell the two sides of a cut (docs/design/method.md §4 and §8).
+// The plane that separates the two sides of a cut for detection and skin (docs/design/method.md §4 and §8).
 #pragma once
 #include "gpu/launch/launcher.h"
 #include "gpu/state/device_view.h"
@@ -6,7 +6,7 @@
 
 namespace cutproof::gpu {
 
-// That of the blade's mid-surface where it stood last in the frame in progress while it was lowered.
+// The plane of the blade's mid-surface in its last lowered pose of the frame in progress.
 struct Plane {
   bool exists = false;
   Float3 edge, normal;
@@ -20,7 +20,7 @@ CUTPROOF_DEVICE inline Plane lowered_plane(const DeviceView& w, const BodyConsta
   }
   return plane;
 }
-// How far x is from it, negative on its negative side [m]. Off by at most 10 u |x| + 8 u |edge| (detect.cuh).
+// Signed height of x over the plane [m]. Wrong by at most 10 u |x| + 8 u |edge| (detect.cuh).
 CUTPROOF_DEVICE inline float height_over(const Plane& plane, Float3 x) { return dot(x - plane.edge, plane.normal); }
 
 }  // namespace cutproof::gpu

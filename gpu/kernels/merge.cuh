@@ -1,16 +1,16 @@
-// Merge (method.md §6): small clusters of the bodies that were cut join clusters that they touch.
+// Merge (method.md §6): small clusters of bodies that were cut join clusters that they touch.
 //
-// A round is two launches. First every small cluster s looks for the cluster t that it would join and writes it to
-// proposal[s]; a proposal asks for both s and t, and best[s] and best[t] decide whose they become: under
-// `deterministic` the proposer with the smallest key, under `published` whoever was first. Then the proposals that got
-// both of theirs are carried out: those pairs are disjoint, so each union is as legal as its proposal.
+// A round is two launches. First every small cluster s finds the cluster t that it would join and writes it to
+// proposal[s]. A proposal asks for both s and t; best[s] and best[t] decide who gets them. Under `deterministic` the
+// proposer with the smallest key does, under `published` the first. Then the proposals that got both are carried out.
+// Those pairs are disjoint, so each union is as legal as its proposal.
 //
-// Rounds end when nobody proposes. A small cluster without a legal target will never have one, so it need not be asked
-// again: a union u ∪ t that would be legal for it contains a u or t that it touches and that was legal before.
+// Rounds end when no cluster proposes. A small cluster without a legal target will never have one, so it does not look
+// again: a union u ∪ t that is legal for it contains a u or t that it touches and that was legal before.
 //
-// Unions are written behind the present members. When the capacity there is used up, the lists are moved together and
-// the round goes on: its unions are disjoint, so they need no more than all lists together, and a merge begins only if
-// there is as much.
+// Unions are written behind the present members. When that capacity is used up, the lists are compacted and the round
+// goes on. Its unions are disjoint, so they need no more than all lists together, and a merge begins only with that
+// much capacity.
 #pragma once
 #include <cstdint>
 
@@ -21,16 +21,16 @@
 
 namespace cutproof::gpu {
 
-// Threads of a block that looks round a pair of clusters: a thousand particles, seven places each.
+// Threads of a block for a pair of clusters: a thousand particles, seven places each.
 inline constexpr int kMergeThreads = 512;
 
-// Scratch of merge in DeviceView::slot_scratch, by slot: where lists go when they are moved together.
+// Scratch of merge in DeviceView::slot_scratch, by slot: the places of compacted lists.
 CUTPROOF_BOTH inline int* moved_begin(const DeviceView& w) { return w.slot_scratch; }
-// r + 1: in round r the cluster itself, or one that it touches, has changed. What it proposes stands until then.
+// r + 1: in round r the cluster, or one that it touches, has changed. Until then its proposal stands.
 CUTPROOF_BOTH inline int* changed_after(const DeviceView& w) { return w.slot_scratch + w.slot_capacity; }
-// Not 0: a particle of the cluster is in fewer or more clusters than before, or the cluster has grown.
+// Not 0: the cluster has grown, or one of its particles is in fewer or more clusters than before.
 CUTPROOF_BOTH inline int* rest_marks(const DeviceView& w) { return w.slot_scratch + int64_t{3} * w.slot_capacity; }
-// DeviceView::best of even and odd rounds. A round writes to one and clears what the round before wrote to the other.
+// DeviceView::best of even and odd rounds. A round writes to one and clears the previous round's other.
 CUTPROOF_BOTH inline int* best_of_round(const DeviceView& w, int round) {
   return round % 2 == 0 ? w.best : w.slot_scratch + int64_t{2} * w.slot_capacity;
 }
@@ -41,12 +41,12 @@ CUTPROOF_BOTH inline bool merges_now(const DeviceView& w, int b) {
 
 // --- Who may join whom -----------------------------------------------------------------------------------------------
 
-// A hash table of the clusters that a small cluster touches, in shared memory. Should it overflow, which takes a
-// cluster with hundreds of neighbours, they are gone through in windows of slots instead.
+// A hash table in shared memory of the clusters that a small cluster touches. If it overflows, which takes hundreds of
+// neighbours, they are examined in windows of slots.
 inline constexpr int kCandidates = 512, kProbes = 24;
 struct TouchTable {
   int* slot;      // [kCandidates] -1: free
-  int* shares;    // [kCandidates] how many particles it shares with the small cluster
+  int* shares;    // [kCandidates] particles shared with the small cluster
   int* overflow;  // [1]
 };
 inline constexpr std::size_t kCandidateBytes = 2 * kCandidates * sizeof(int) + 16;
@@ -73,8 +73,8 @@ CUTPROOF_DEVICE void add_candidate(Block& block, const TouchTable& table, int t,
   block.store(table.overflow, 1);
 }
 
-// Calls visit(t, shares) for memberships t of the members of s (shares: true) and of their neighbours in G, many of
-// them several times. The threads of the block share the work.
+// Calls visit(t, shares) for memberships t of the members of s (shares: true) and of their neighbours in G, many
+// several times. The threads of the block share the work.
 template <class Block, class Visit>
 CUTPROOF_DEVICE void for_touching(Block& block, const DeviceView& w, int s, Visit visit) {
   const BodyConstants& body = w.body[w.slot_body[s]];
@@ -94,7 +94,7 @@ CUTPROOF_DEVICE void for_touching(Block& block, const DeviceView& w, int s, Visi
   }
 }
 
-// Preference as a number: smallest t first, then the lowest number, which is the lowest slot; ~0: not legal.
+// Preference as a number: smallest t first, then the lowest number (slot); ~0: not legal.
 CUTPROOF_DEVICE inline unsigned long long preference(const DeviceView& w, int s, int t, int shares) {
   const int size = w.slot_size[s], target_size = w.slot_size[t];
   const bool contained = shares == size;
@@ -103,7 +103,7 @@ CUTPROOF_DEVICE inline unsigned long long preference(const DeviceView& w, int s,
   return static_cast<unsigned long long>(target_size) << 32 | static_cast<unsigned>(t);
 }
 
-// The cluster that s would join, or -1; the same for all threads. s is not empty.
+// The cluster that s, not empty, would join, or -1; the same for all threads.
 template <class Block>
 CUTPROOF_DEVICE int preferred_target(Block& block, const DeviceView& w, int s, const TouchTable& table) {
   for (int i = block.thread(); i < kCandidates; i += block.size()) {
@@ -124,11 +124,11 @@ CUTPROOF_DEVICE int preferred_target(Block& block, const DeviceView& w, int s, c
     }
     least = block.smallest(least);
   } else {
-    // Slot by slot in windows as wide as the table, which then needs no search: where hundreds of clusters overlap, one
-    // walk for each of them would take forever.
+    // Windows of slots as wide as the table need no search. One walk for each of hundreds of overlapping clusters would
+    // take forever.
     constexpr int kNone = 0x7fffffff;
     for (int begin = 0;;) {
-      block.sync();  // the last window has been read
+      block.sync();  // the previous window has been read
       for (int i = block.thread(); i < kCandidates; i += block.size()) {
         table.slot[i] = -1;
         table.shares[i] = 0;
@@ -189,14 +189,14 @@ CUTPROOF_BOTH inline bool precedes(const ProposalKey& a, const ProposalKey& b) {
   return a.source < b.source;
 }
 
-// best[named] becomes s unless a proposal with a smaller key is there. One thread; proposal[s] is visible to all.
+// Stores s in best[named] unless a smaller key is there. One thread; proposal[s] is visible to all.
 template <class Block>
 CUTPROOF_DEVICE void offer_key(Block& block, const DeviceView& w, int* best, int named, int s, int t, int round) {
   const ProposalKey own = proposal_key(w.slot_number[s], w.slot_number[t], round);
   int other = block.load(&best[named]);
   for (;;) {
     if (other >= 0) {
-      block.fence();  // its proposal was written before it came here
+      block.fence();  // the proposal was written before it came here
       const int target = block.load(&w.proposal[other]);
       if (!precedes(own, proposal_key(w.slot_number[other], w.slot_number[target], round))) return;
     }
@@ -206,8 +206,8 @@ CUTPROOF_DEVICE void offer_key(Block& block, const DeviceView& w, int* best, int
   }
 }
 
-// Takes both ends or none. The lower end first: then the claims that are turned away in a pass each waited for a
-// higher end than the last, so in every schedule the last one is not turned away, and every pass merges something.
+// Takes both ends or none, the lower end first. So each claim turned away in a pass waited for a higher end than the
+// previous one. Hence in every schedule the last claim succeeds, and every pass merges something.
 template <class Block>
 CUTPROOF_DEVICE void claim_both(Block& block, int* best, int s, int t) {
   const int low = s < t ? s : t, high = s < t ? t : s;
@@ -215,7 +215,7 @@ CUTPROOF_DEVICE void claim_both(Block& block, int* best, int s, int t) {
   if (block.atomic_cas(&best[high], -1, s) != -1) block.store(&best[low], -1);
 }
 
-// Small clusters propose, in round Counters::round.
+// Small clusters propose in round Counters::round.
 template <class Block>
 CUTPROOF_DEVICE void propose_merges_kernel(Block& block, DeviceView w) {
   const TouchTable table = take_candidate_table(block);
@@ -229,15 +229,14 @@ CUTPROOF_DEVICE void propose_merges_kernel(Block& block, DeviceView w) {
     const int s = w.small_clusters[job];
     const BodyConstants& body = w.body[w.slot_body[s]];
     const int before = w.proposal[s];
-    if (round > 0 && before < 0) continue;  // never again
-    // Many clusters may wait for the same target, round after round: looking again only where something has changed
-    // keeps that from costing a search each.
+    if (round > 0 && before < 0) continue;  // never proposes again
+    // Many clusters may wait for the same target, round after round. Only changed neighbourhoods are searched again.
     int t = before;
     const bool stands = round > 0 && block.load(&changed_after(w)[s]) != round;
     if (!stands) {
       t = -1;
       if (w.slot_size[s] > 0 && w.slot_size[s] < body.tau) t = preferred_target(block, w, s, table);
-      block.sync();  // everyone has read proposal[s]
+      block.sync();  // all threads have read proposal[s]
     }
     if (block.thread() != 0) continue;
     if (before >= 0) {
@@ -259,8 +258,7 @@ CUTPROOF_KERNEL_THREADS(propose_merges_kernel, kMergeThreads);
 
 // --- Merging ---------------------------------------------------------------------------------------------------------
 
-// The first of `count` free places for members; -1: there are too few, and the lists are to be moved together. One
-// thread.
+// The first of `count` free places for members; -1: too few, the lists must be compacted. One thread.
 template <class Block>
 CUTPROOF_DEVICE int reserve_members(Block& block, const DeviceView& w, int count) {
   Counters& c = *w.counters;
@@ -271,8 +269,8 @@ CUTPROOF_DEVICE int reserve_members(Block& block, const DeviceView& w, int count
   return -1;
 }
 
-// Members of s become members of t instead, or of one cluster less if they are in `list`, the members of t, already.
-// Other blocks do the same for other pairs in the same rows of memberships, in other places of them.
+// Members of s become members of t instead, or lose a membership if they are in `list`, the members of t. Other blocks
+// do so for other pairs, in other places of the same rows of memberships.
 template <class Block>
 CUTPROOF_DEVICE void hand_over(Block& block, const DeviceView& w, int s, int t, const int* list, int size) {
   int* marks = rest_marks(w);
@@ -295,9 +293,9 @@ CUTPROOF_DEVICE void hand_over(Block& block, const DeviceView& w, int s, int t, 
   }
 }
 
-// Carries out the proposals that got both ends; again: those that found no places, if there were any and lists have
-// been moved together. There is another round if one did not get both: nobody else would propose in it. (Whoever is
-// small and taken has proposed something itself, and lost, or never will again.)
+// Carries out the proposals that got both ends. again: those that found no places before compaction. Another round
+// follows if a proposal did not get both; no other cluster could propose in it. (A small cluster that another one took
+// has itself proposed and lost, or never proposes again.)
 template <class Block>
 CUTPROOF_DEVICE void merge_pairs_kernel(Block& block, DeviceView w, bool again) {
   int* place = block.template shared<int>(1);
@@ -312,7 +310,7 @@ CUTPROOF_DEVICE void merge_pairs_kernel(Block& block, DeviceView w, bool again) 
       if (block.thread() == 0) block.store(&c.merging, 1);
       continue;
     }
-    if (w.slot_size[s] == 0) continue;  // done
+    if (w.slot_size[s] == 0) continue;  // done before
     const int size = w.slot_size[s], target_size = w.slot_size[t];
     const int* members = w.members + w.slot_begin[s];
     const int* target = w.members + w.slot_begin[t];
@@ -324,7 +322,7 @@ CUTPROOF_DEVICE void merge_pairs_kernel(Block& block, DeviceView w, bool again) 
     }
     const bool fits = missing == 0 || *place >= 0;
     if (fits) {
-      // Others hand over at the same time: who is read here may be gone, but then whoever took it in says so itself.
+      // Others change at the same time: a cluster read here may be gone, but the one that took it in then marks itself.
       int* changed = changed_after(w);
       const auto note = [&](int touched, bool) { block.store(&changed[touched], c.merging_round + 1); };
       for_touching(block, w, s, note);
@@ -349,7 +347,7 @@ CUTPROOF_KERNEL_THREADS(merge_pairs_kernel, kMergeThreads);
 
 // --- Beginning and end -----------------------------------------------------------------------------------------------
 
-// A merge does not begin after a fault: what the faulty stage left may still hold dead particles.
+// No merge after a fault: the faulty stage may have left dead particles in clusters.
 template <class Block>
 CUTPROOF_DEVICE void begin_merge_kernel(Block& block, DeviceView w) {
   const Counters& c = *w.counters;
@@ -366,7 +364,7 @@ CUTPROOF_DEVICE void begin_merge_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(begin_merge_kernel);
 
-// Lists the small clusters, and asks whether the capacity surely suffices for a round: it unites each list at most
+// Lists the small clusters and asks whether capacity surely suffices for a round. A round unites each list at most
 // once, and each small cluster with one other to at most cap members. One block.
 template <class Block>
 CUTPROOF_DEVICE void begin_rounds_kernel(Block& block, const DeviceView& w) {
@@ -400,7 +398,7 @@ CUTPROOF_DEVICE void begin_rounds_kernel(Block& block, const DeviceView& w) {
 }
 CUTPROOF_KERNEL_THREADS(begin_rounds_kernel, kListThreads);
 
-// Of clusters that have grown, and of those whose particles are now in fewer.
+// Of clusters that have grown, and of clusters whose particles are in fewer clusters.
 template <class Block>
 CUTPROOF_DEVICE void rest_frames_after_merge_kernel(Block& block, DeviceView w) {
   if (w.counters->small == 0) return;
@@ -412,9 +410,9 @@ CUTPROOF_DEVICE void rest_frames_after_merge_kernel(Block& block, DeviceView w) 
 }
 CUTPROOF_KERNEL(rest_frames_after_merge_kernel);
 
-// --- Moving all lists together ---------------------------------------------------------------------------------------
+// --- Compacting lists ------------------------------------------------------------------------------------------------
 
-// To DeviceView::label, in the order of slots.
+// Copies to DeviceView::label in the order of slots.
 template <class Block>
 CUTPROOF_DEVICE void gather_members_kernel(Block& block, DeviceView w) {
   for (int s = block.index(); s < w.counters->moving; s += block.count()) {
@@ -424,7 +422,7 @@ CUTPROOF_DEVICE void gather_members_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(gather_members_kernel);
 
-// And back.
+// Copies back.
 template <class Block>
 CUTPROOF_DEVICE void place_members_kernel(Block& block, DeviceView w) {
   Counters& c = *w.counters;
@@ -433,28 +431,28 @@ CUTPROOF_DEVICE void place_members_kernel(Block& block, DeviceView w) {
   for (int64_t s = block.first(); s < c.moving; s += block.stride()) w.slot_begin[s] = moved_begin(w)[s];
   if (block.first() != 0) return;
   c.members_used = c.moved_members;
-  c.groups_whole = 1;  // what groups say of clusters lies where their members lay
+  c.groups_whole = 1;  // groups refer to the members' former places
 }
 CUTPROOF_KERNEL(place_members_kernel);
 
-// None, unless Counters::moving says so.
+// Launched only if Counters::moving says so.
 template <class Launcher>
 void enqueue_move_together(Launcher& launcher, const DeviceView& w) {
   launcher.exclusive_scan(w.slot_size, moved_begin(w), w.slot_capacity, &w.counters->moved_members,
                           &w.counters->moving);
-  // Hardly ever is anything moved, so what there is to launch and to end at once is kept small.
+  // Lists are hardly ever compacted, so idle launches are kept small.
   constexpr int64_t kBlocks = 128, kThreads = 256;
   launcher.blocks(gather_members_kernel_object{}, kBlocks, kThreads, 0, w);
   launcher.items(place_members_kernel_object{}, kBlocks * kThreads, w);
 }
 
-// The work that follows a cut is small, so grids are kept small too: blocks take several clusters if there are many.
+// Little work follows a cut, so grids are small; a block may take several clusters.
 inline constexpr int kMergeBlocks = 2048, kBlocksAgain = 128;
 
 template <class Launcher>
 void enqueue_merge_rounds(Launcher& launcher, const DeviceView& w) {
   const int64_t most = w.slots_expected < kMergeBlocks ? w.slots_expected : kMergeBlocks;
-  // One condition, whatever happens: it costs as much as ten launches of kernels that find nothing to do.
+  // One condition: it costs as much as ten launches of kernels without work.
   launcher.while_nonzero(&w.counters->merging, [&](Launcher& round) {
     round.blocks(propose_merges_kernel_object{}, most, kMergeThreads, kCandidateBytes, w);
     round.blocks(merge_pairs_kernel_object{}, most, kMergeThreads, 16, w, false);
@@ -464,7 +462,7 @@ void enqueue_merge_rounds(Launcher& launcher, const DeviceView& w) {
   launcher.teams(rest_frames_after_merge_kernel_object{}, kRestTeam, w.slots_expected, w);
 }
 
-// rest_frames: what launches those of clusters as they are. Which of them are small is asked meanwhile.
+// rest_frames: launches those of the present clusters, while small ones are listed.
 template <class Launcher, class RestFrames = NoWork>
 void enqueue_merge(Launcher& launcher, const DeviceView& w, RestFrames rest_frames = {}) {
   launcher.side_by_side(

@@ -1,4 +1,4 @@
-// Rest frames of clusters whose members, or whose members' shares, have changed (method.md §5).
+// Rest frames of clusters whose members or members' shares have changed (method.md §5).
 #pragma once
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/team.h"
@@ -9,9 +9,9 @@ namespace cutproof::gpu {
 // Lanes that compute one rest frame.
 inline constexpr int kRestTeam = 32;
 
-// T_s and M_s of one cluster, by all lanes of the team, with the weights w = m / n of its present members:
-// T_s = h · (rest_base + rest_offset), the base being its first member. Sums are relative to the base, and what they
-// are off by is summed once more and taken out, so that one rounding of the offset is left.
+// T_s and M_s of one cluster, by all lanes of the team, with the weights w = m / n of its present members: T_s = h ·
+// (rest_base + rest_offset), with its first member as the base. Sums are relative to the base. A second sum removes
+// their error, so that one rounding of the offset is left.
 template <class Block>
 CUTPROOF_DEVICE void recompute_rest_frame(const Team<Block, kRestTeam>& team, const DeviceView& w, int s) {
   const BodyConstants& body = w.body[w.slot_body[s]];

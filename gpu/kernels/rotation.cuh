@@ -1,6 +1,6 @@
 // The rotation of one cluster: argmax over rotations R of tr(Rᵀ A), by Newton's method. Kernels use single precision;
-// double is there too, so that the cost of precision can be measured. Methods that were measured beside it:
-// benchmarks/rotation_algorithms.cuh; what each of them is worth: docs/results/accuracy.md, Rotations.
+// double exists to measure the cost of precision. Other measured methods: benchmarks/rotation_algorithms.cuh; their
+// worth: docs/results/accuracy.md, Rotations.
 #pragma once
 #include <limits>
 
@@ -20,7 +20,7 @@ struct Quaternion {
   Real w, x, y, z;
 };
 
-// Where Newton's method begins: a rotation both ways.
+// The start of Newton's method, as quaternion and as matrix.
 template <class Real>
 struct Start {
   Quaternion<Real> q;
@@ -37,7 +37,7 @@ CUTPROOF_BOTH inline float with_sign(float size, float sign) { return copysignf(
 CUTPROOF_BOTH inline double with_sign(double size, double sign) { return copysign(size, sign); }
 CUTPROOF_BOTH inline float times_power_of_two(float a, int exponent) { return ldexpf(a, exponent); }
 CUTPROOF_BOTH inline double times_power_of_two(double a, int exponent) { return ldexp(a, exponent); }
-// Such that |a| / 2^exponent lies in [1/2, 1).
+// The exponent for which |a| / 2^exponent lies in [1/2, 1).
 CUTPROOF_BOTH inline int exponent_of(float a) {
   int exponent = 0;
   static_cast<void>(frexpf(a, &exponent));
@@ -62,8 +62,8 @@ CUTPROOF_BOTH inline float float_of(unsigned bits) {
 
 template <class Real>
 inline constexpr bool kSingle = sizeof(Real) == sizeof(float);
-// A threshold at the level of rounding, given for single precision: in double as many units of it, to the `power` in
-// which the rounding enters.
+// A threshold at the level of rounding, given for single precision and scaled for double. `power`: the power in which
+// the rounding enters.
 template <class Real>
 consteval Real rounding(double in_single, int power = 1) {
   for (int k = 0; k < power; ++k) in_single *= kSingle<Real> ? 1 : 0x1p-29;
@@ -92,7 +92,7 @@ CUTPROOF_BOTH inline Quaternion<Real> normalized(Quaternion<Real> a) {
   return (1 / root(dot(a, a))) * a;
 }
 
-// Of any q but zero. Dividing by |q|² here, and not q by |q| before, saves a third of the error in RᵀR.
+// For any q but zero. Dividing by |q|² here, instead of q by |q| before, saves a third of the error in RᵀR.
 template <class Real>
 CUTPROOF_BOTH inline Matrix3x3<Real> matrix_of(Quaternion<Real> q) {
   const Real s = 2 / dot(q, q);
@@ -109,7 +109,7 @@ CUTPROOF_BOTH inline Matrix3x3<Real> matrix_of(Quaternion<Real> q) {
   return r;
 }
 
-// Shepperd 1978: the largest of the four squares is divided by, so no digits are lost near half turns.
+// Shepperd 1978: divides by the largest of the four squares, so half turns lose no digits.
 template <class Real>
 CUTPROOF_BOTH inline Quaternion<Real> quaternion_of(const Matrix3x3<Real>& r) {
   const Real trace = r(0, 0) + r(1, 1) + r(2, 2);
@@ -131,20 +131,20 @@ CUTPROOF_BOTH inline Vector3<Real> column(const Matrix3x3<Real>& a, int k) {
   return {a(0, k), a(1, k), a(2, k)};
 }
 
-// A times a power of two, so exactly, such that the greatest entry lies in [1/2, 1): tiny and huge clusters neither
-// underflow nor overflow. False if there is nothing to scale: A is zero or not finite.
+// Scales A exactly, by a power of two, so that its greatest entry lies in [1/2, 1). So neither tiny nor huge clusters
+// underflow or overflow. False if A is zero or not finite.
 template <class Real>
 CUTPROOF_BOTH inline bool scale_to_one(Matrix3x3<Real>& a) {
   if constexpr (kSingle<Real>) {
-    // Bits of sizes are in the order of the sizes, with what is not finite above all. The greatest of them by pairs:
-    // one after the other, each would wait for the one before.
+    // As bits, sizes have their order, with non-finite numbers above all. The maximum is taken by pairs: in sequence,
+    // each step would wait for the previous one.
     unsigned size[9];
     for (int k = 0; k < 9; ++k) size[k] = bits_of(a.m[k]) & 0x7fffffffu;
     const auto greater = [](unsigned x, unsigned y) { return x > y ? x : y; };
     const unsigned greatest = greater(greater(greater(size[0], size[1]), greater(size[2], size[3])),
                                       greater(greater(greater(size[4], size[5]), greater(size[6], size[7])), size[8]));
     const unsigned exponent = greatest >> 23;
-    // Where both the number and its reciprocal are normal, and nothing that matters underflows.
+    // Here the number and its reciprocal are normal, and nothing that matters underflows.
     if (exponent >= 64 && exponent <= 190) {
       const float factor = float_of((253u - exponent) << 23);
       for (int k = 0; k < 9; ++k) a.m[k] = a.m[k] * factor;
@@ -160,15 +160,15 @@ CUTPROOF_BOTH inline bool scale_to_one(Matrix3x3<Real>& a) {
   }
   if (!finite || greatest == 0) return false;
   const int exponent = exponent_of(greatest);
-  // In two factors, because 2^148, which a denormal needs, is not a number of single precision, nor 2^1073 of double.
+  // Two factors, because neither 2^148 in single nor 2^1073 in double precision exists; denormals need them.
   const Real first = times_power_of_two(Real(1), -exponent / 2),
              second = times_power_of_two(Real(1), -exponent - -exponent / 2);
   for (int k = 0; k < 9; ++k) a.m[k] = a.m[k] * first * second;
   return true;
 }
 
-// The rotation by the angle whose tangent is returned makes the off-diagonal entry `pq` of a symmetric matrix vanish;
-// the smaller of the two angles. No branch, and no overflow for entries of at most 1e18.
+// Makes the off-diagonal entry `pq` of a symmetric matrix vanish; of the two rotations the one with the smaller angle.
+// Returns the angle's tangent. No branch, and no overflow for entries up to 1e18.
 template <class Real>
 CUTPROOF_BOTH inline Real jacobi_tangent(Real pp, Real qq, Real pq) {
   const Real difference = qq - pp;
@@ -212,11 +212,11 @@ CUTPROOF_BOTH inline void davenport(const Matrix3x3<Real>& a, Real (&n)[4][4]) {
   n[2][3] = n[3][2] = a(1, 2) + a(2, 1);
 }
 
-// Two eigenvalues nearer than this, relative to the greatest, are one. The rounding of the sweeps is below a third
-// of it, and taking any vector of the joint eigenspace costs at most this much of the objective.
+// Eigenvalues nearer than this, relative to the greatest, count as one. The sweeps' rounding is below a third of it.
+// Any vector of the joint eigenspace costs at most this much of the objective.
 template <class Real>
 inline constexpr Real kSameEigenvalue = rounding<Real>(0x1p-21);
-// With one sweep fewer a few of 40,000 matrices of a hard case are wrong, in either precision.
+// With one sweep fewer, a few of 40,000 matrices of a hard case are wrong in either precision.
 template <class Real>
 inline constexpr int kJacobiSweeps = kSingle<Real> ? 4 : 5;
 
@@ -245,7 +245,7 @@ CUTPROOF_BOTH inline Rotation<Real> by_jacobi4(const Matrix3x3<Real>& a, const M
   for (int k = 0; k < 4; ++k) dimension += top - n[k][k] <= kSameEigenvalue<Real> * top;
   result.degenerate = dimension > 1;
   if (result.degenerate) {
-    // Any unit vector of the eigenspace is an answer: the one nearest to the previous rotation.
+    // Of all unit vectors of the eigenspace, the nearest to the previous rotation.
     const Quaternion<Real> before = quaternion_of(previous);
     Quaternion<Real> projected = {0, 0, 0, 0};
     for (int k = 0; k < 4; ++k) {
@@ -253,15 +253,15 @@ CUTPROOF_BOTH inline Rotation<Real> by_jacobi4(const Matrix3x3<Real>& a, const M
       const Quaternion<Real> axis = {v[0][k], v[1][k], v[2][k], v[3][k]};
       projected = projected + dot(axis, before) * axis;
     }
-    // At right angles to all answers it is equally far from each: any will do.
+    // A previous rotation orthogonal to all answers is equally far from each.
     if (dot(projected, projected) > rounding<Real>(1e-8)) q = projected;
   }
   result.r = matrix_of(q);
   return result;
 }
 
-// The objective at the rotation R, turned on by a small ω in the rotated frame: with B = Rᵀ A it is
-// tr B + g·ω - ½ ωᵀ H ω + …, g the axial vector of B and H = tr(B) I - sym(B).
+// The objective at R, after a small further rotation ω in the rotated frame. With B = Rᵀ A it is tr B + g·ω - ½ ωᵀ H ω
+// + …, where g is the axial vector of B and H = tr(B) I - sym(B).
 template <class Real>
 struct Expansion {
   Vector3<Real> g;
@@ -298,18 +298,17 @@ CUTPROOF_BOTH inline Expansion<Real> expand(const Matrix3x3<Real>& a, const Matr
   return e;
 }
 
-// q turned on by ω in its own frame, through Cayley's map; not of unit length.
+// q rotated further by ω in its own frame, through Cayley's map; not of unit length.
 template <class Real>
 CUTPROOF_BOTH inline Quaternion<Real> turned(Quaternion<Real> q, Vector3<Real> omega) {
   return q * Quaternion<Real>{1, Real(0.5) * omega.x, Real(0.5) * omega.y, Real(0.5) * omega.z};
 }
 
-// Newton's method from the previous rotation where it can be shown to have found the best one, else by_jacobi4. At a
-// stationary point B is symmetric with eigenvalues b1, b2, b3, and H has the eigenvalues bi + bj: that they are
-// positive is what distinguishes the greatest maximum (N's other eigenvalues are lower by 2 (bi + bj)). So a step of
-// less than 1e-3 from a point where H is safely positive ends there: what is left of the objective is below
-// ½ |ω|⁴ / λ, with λ >= 1e-5 the least eigenvalue that the bound on the determinant lets through: 5e-8. In double the
-// step is 5e-6, which leaves 4e-17.
+// Newton's method from the previous rotation where it provably finds the best one, else by_jacobi4. At a stationary
+// point B is symmetric with eigenvalues b1, b2, b3, and H has the eigenvalues bi + bj. Only at the greatest maximum are
+// all positive, because N's other eigenvalues are lower by 2 (bi + bj). So a step below 1e-3 from a point where H is
+// safely positive ends there. The objective's remaining error is below ½ |ω|⁴ / λ, 5e-8. λ >= 1e-5 is the least
+// eigenvalue that the bound on the determinant admits. In double the step is 5e-6, which leaves 4e-17.
 template <class Real>
 inline constexpr Real kLastSquare = static_cast<Real>(kSingle<Real> ? 1e-6 : 3e-11);
 template <class Real>
@@ -324,7 +323,7 @@ CUTPROOF_BOTH inline Rotation<Real> by_newton(const Matrix3x3<Real>& a, const Ma
     if (!positive) break;
     const Vector3<Real> omega = (1 / e.determinant) * e.scaled_step();
     q = turned(q, omega);
-    r = matrix_of(q);  // of q of any length; should long steps leave none that is a number, nothing below is true
+    r = matrix_of(q);  // from q of any length; if a long step made it NaN, the conditions below are false
     if (gpu::dot(omega, omega) < kLastSquare<Real>) return {r, false};
   }
   return by_jacobi4(a, previous);
@@ -332,15 +331,15 @@ CUTPROOF_BOTH inline Rotation<Real> by_newton(const Matrix3x3<Real>& a, const Ma
 
 }  // namespace rotation_detail
 
-// What follows from the previous rotation alone, so that it may be computed before A is known.
+// The part that depends on the previous rotation alone, so that it can be computed before A is known.
 template <class Real>
 CUTPROOF_BOTH inline Start<Real> start_from(const Matrix3x3<Real>& previous) {
   const Quaternion<Real> q = rotation_detail::quaternion_of(previous);
   return {q, rotation_detail::matrix_of(q)};
 }
 
-// One rotation problem. Where the answer is not unique, the one nearest to `previous`; where A is zero or not finite,
-// `previous`. Never NaN if `previous` is a rotation. start: start_from(previous).
+// One rotation problem. Of several answers the nearest to `previous`; `previous` where A is zero or not finite. Never
+// NaN if `previous` is a rotation. start: start_from(previous).
 template <class Real>
 CUTPROOF_BOTH inline Rotation<Real> rotate(Matrix3x3<Real> a, const Matrix3x3<Real>& previous,
                                            const Start<Real>& start) {

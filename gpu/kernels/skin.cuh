@@ -1,11 +1,11 @@
-// Stage skin (docs/design/method.md §8). enqueue_skin_cells extracts again the cells that lost a corner in this frame,
-// or every cell of a body that has no skin yet; enqueue_skin_clusters then notes the clusters that its vertices hang
-// on, and enqueue_skin_positions puts all vertices where the clusters carry them.
+// Stage skin (docs/design/method.md §8). enqueue_skin_cells extracts anew the cells that lost a corner in this frame,
+// or every cell of a body without a skin. enqueue_skin_clusters then notes the clusters that carry vertices, and
+// enqueue_skin_positions places all vertices.
 //
-// A vertex is known by its owner and direction. It is made when the particle beyond its grid edge dies (or with the
-// body's first skin) and lasts as long as its owner, because the dead do not come back; so cells that kept all
-// corners keep their triangles as they are. What there is to do hangs on the particles that have changed, so they are
-// listed first, ascending; places of vertices and cells are given out in their order.
+// A vertex is known by its owner and direction. It is made when the particle beyond its grid edge dies, or with the
+// body's first skin. It lasts as long as its owner, because particles do not revive; so cells that kept all corners
+// keep their triangles. The changed particles decide all work. They are listed first, ascending, and get places for
+// vertices and cells in that order.
 #pragma once
 #include "gpu/kernels/carried_tissue.cuh"
 #include "gpu/kernels/lowered_plane.cuh"
@@ -28,8 +28,8 @@ CUTPROOF_DEVICE inline bool skinned(const DeviceView& w, int b) { return running
 CUTPROOF_DEVICE inline bool extracts(const DeviceView& w, int b) {
   return skinned(w, b) && (w.cut[b] >= 0 || !w.skin_made[b]);
 }
-// Whether a particle with that DeviceView::death changes the cells around it: it died in this frame, by detection or as
-// debris, or there is no skin yet and it is tissue. Only of a body that was cut.
+// Whether a particle with that DeviceView::death changes the cells around it. It does if it died in this frame, by
+// detection or as debris, or if there is no skin yet and it is tissue. Only of a body that was cut.
 CUTPROOF_DEVICE inline bool changes_cells(const DeviceView& w, int b, int death) {
   return w.skin_made[b] ? death == w.cut[b] || death == w.cut[b] + 1 : death < 0;
 }
@@ -37,8 +37,8 @@ CUTPROOF_DEVICE inline int corner_step(const BodyConstants& body, int corner) {
   return (corner & 1) + body.nodes[0] * ((corner >> 1 & 1) + body.nodes[1] * (corner >> 2));
 }
 
-// The particles at a cell's corners, -1 where there is none, which of them are tissue, and which change the cells
-// around them, as bits. All are asked for at once.
+// The particles at a cell's corners (-1: none), and as bits which are tissue and which change the cells around them.
+// All are read at once.
 struct Cell {
   int corner[8];
   int inside, changing;
@@ -58,8 +58,7 @@ CUTPROOF_DEVICE inline Cell cell_at(const DeviceView& w, int b, int64_t node) {
   return cell;
 }
 
-// The vertex that p's death, or p in a first skin, brings about along d; no owner: none. No two particles bring about
-// the same one.
+// The vertex that p's death, or p in a first skin, makes along d; no owner: none. No two particles make the same one.
 struct NewVertex {
   int owner, direction;
 };
@@ -70,9 +69,9 @@ CUTPROOF_DEVICE inline NewVertex new_vertex(const DeviceView& w, int b, int p, i
   return {!q_alive && w.vertex_of[6 * p + d] < 0 ? p : -1, d};
 }
 
-// Where a vertex lies on its grid edge, as far as its owner and direction say: where the surface of the uncut body
-// crosses that edge, where the skin that was loaded had it, and otherwise alpha; kReachUnknown of one that the blade
-// may have brought about in this frame.
+// A vertex's place on its grid edge, as far as owner and direction decide it: where the uncut body's surface crosses
+// the edge, or where the loaded skin had it, otherwise alpha. kReachUnknown: the blade may have made the vertex in this
+// frame.
 CUTPROOF_DEVICE inline float known_reach(const DeviceView& w, int b, NewVertex made) {
   const BodyConstants& body = w.body[b];
   const int edge = 6 * made.owner + made.direction;
@@ -82,7 +81,7 @@ CUTPROOF_DEVICE inline float known_reach(const DeviceView& w, int b, NewVertex m
     return crossing > 0 ? static_cast<float>(crossing) / kCrossingSteps : body.alpha;
   }
   if (!w.skin_made[b]) {
-    int low = 0, high = w.kept_count;  // the first that is not less than the edge
+    int low = 0, high = w.kept_count;  // the first not less than the edge
     while (low < high) {
       const int middle = low + (high - low) / 2;
       if (w.kept_edge[middle] < edge) {
@@ -102,12 +101,12 @@ CUTPROOF_DEVICE inline float known_reach(const DeviceView& w, int b, NewVertex m
 inline constexpr int kCornerTeam = 8;
 inline constexpr int kReserveThreads = 512;
 
-// Particles that change the cells around them, ascending: as many as Counters::skin_changes. And for each of them,
-// first how many vertices and cells it needs, then how many those before it do.
+// Particles that change the cells around them, ascending: as many as Counters::skin_changes. For each of them first the
+// number of vertices and cells that it needs, then the number that earlier ones need.
 CUTPROOF_BOTH inline int* changed(const DeviceView& w) { return w.fallen; }
 CUTPROOF_BOTH inline int* new_vertices(const DeviceView& w) { return w.particle_scratch; }
 CUTPROOF_BOTH inline int* new_cells(const DeviceView& w) { return w.particle_scratch + w.particles; }
-// By particle: the corners at which it is the lowest of its cell's that change, as bits: those cells are its own.
+// By particle, as bits: its own cells, in which it is the lowest changing corner.
 CUTPROOF_BOTH inline unsigned char* own_corners(const DeviceView& w) { return w.particle_flag; }
 
 }  // namespace skin_detail
@@ -127,7 +126,7 @@ CUTPROOF_DEVICE void flag_changed_particles_kernel(Block& block, const DeviceVie
 }
 CUTPROOF_KERNEL(flag_changed_particles_kernel);
 
-// What each of them needs.
+// Counts the vertices and cells that each needs.
 template <class Block>
 CUTPROOF_DEVICE void count_skin_changes_kernel(Block& block, const DeviceView& w) {
   using namespace skin_detail;
@@ -157,7 +156,7 @@ CUTPROOF_DEVICE void count_skin_changes_kernel(Block& block, const DeviceView& w
 CUTPROOF_KERNEL(count_skin_changes_kernel);
 
 namespace skin_detail {
-// counts[k] becomes the sum of those before it; returns the sum of all. Reached by all threads of the one block.
+// Replaces counts[k] by the sum of its predecessors; returns the sum of all. Reached by all threads of the one block.
 template <class Block>
 CUTPROOF_DEVICE int sum_before(Block& block, int* counts, int count) {
   constexpr int kEach = 4;
@@ -178,7 +177,7 @@ CUTPROOF_DEVICE int sum_before(Block& block, int* counts, int count) {
 }
 }  // namespace skin_detail
 
-// Gives out places for new vertices and cells, or says that there are too few. After a fault the skin stays as it is.
+// Gives places to new vertices and cells, or reports that there are too few. After a fault the skin stays unchanged.
 // One block.
 template <class Block>
 CUTPROOF_DEVICE void reserve_skin_kernel(Block& block, const DeviceView& w) {
@@ -199,7 +198,7 @@ CUTPROOF_DEVICE void reserve_skin_kernel(Block& block, const DeviceView& w) {
 }
 CUTPROOF_KERNEL_THREADS(reserve_skin_kernel, skin_detail::kReserveThreads);
 
-// Vertices of the dead go, those that deaths or a first skin bring about come.
+// Removes vertices of the dead, adds those of deaths or of a first skin.
 template <class Block>
 CUTPROOF_DEVICE void renew_vertices_kernel(Block& block, const DeviceView& w) {
   using namespace skin_detail;
@@ -231,7 +230,7 @@ CUTPROOF_DEVICE void renew_vertices_kernel(Block& block, const DeviceView& w) {
 }
 CUTPROOF_KERNEL(renew_vertices_kernel);
 
-// Writes the triangles of the cells around what has changed.
+// Writes the triangles of the cells around changed particles.
 template <class Block>
 CUTPROOF_DEVICE void extract_cells_kernel(Block& block, const DeviceView& w) {
   using namespace skin_detail;
@@ -254,7 +253,7 @@ CUTPROOF_DEVICE void extract_cells_kernel(Block& block, const DeviceView& w) {
         corners = table.corners[cell.inside];
         place = w.cell_of[node];
       }
-      // All tissue or all empty, and it never had a triangle: it stays without a place.
+      // All tissue or all empty, and never with a triangle: it stays without a place.
       const bool fresh = place < 0 && corners[0] >= 0;
       int found = 0;
       const int given = next + team.rank(fresh, found);
@@ -265,7 +264,7 @@ CUTPROOF_DEVICE void extract_cells_kernel(Block& block, const DeviceView& w) {
         w.cell_node[place] = static_cast<int>(node);
       }
       if (place < 0) continue;
-      int vertex[3 * kMostSkinTriangles];  // all asked for before the first is written
+      int vertex[3 * kMostSkinTriangles];  // all read before the first is written
       for (int c = 0; c < 3 * kMostSkinTriangles; ++c) {
         vertex[c] = -1;
         const int edge = corners[c];
@@ -286,7 +285,7 @@ CUTPROOF_DEVICE void extract_cells_kernel(Block& block, const DeviceView& w) {
 }
 CUTPROOF_KERNEL(extract_cells_kernel);
 
-// Says which clusters vertices hang on.
+// Notes the clusters that carry vertices.
 template <class Block>
 CUTPROOF_DEVICE void mark_under_skin_kernel(Block& block, const DeviceView& w) {
   for (int64_t v = block.first(); v < w.counters->vertices_used; v += block.stride()) {
@@ -299,7 +298,7 @@ CUTPROOF_DEVICE void mark_under_skin_kernel(Block& block, const DeviceView& w) {
 }
 CUTPROOF_KERNEL(mark_under_skin_kernel);
 
-// Asks which particles are there, and nothing of clusters: what changes these may go on meanwhile.
+// Depends on which particles live, not on clusters; these may change meanwhile.
 template <class Launcher>
 void enqueue_skin_cells(Launcher& launcher, const DeviceView& w, const Plan&) {
   using namespace skin_detail;
@@ -310,7 +309,7 @@ void enqueue_skin_cells(Launcher& launcher, const DeviceView& w, const Plan&) {
   launcher.teams(renew_vertices_kernel_object{}, kCornerTeam, w.particles, w);
   launcher.teams(extract_cells_kernel_object{}, kCornerTeam, w.particles, w);
 }
-// When clusters and cells have changed.
+// After clusters and cells have changed.
 template <class Launcher>
 void enqueue_skin_clusters(Launcher& launcher, const DeviceView& w, const Plan&) {
   launcher.items(mark_under_skin_kernel_object{}, w.vertex_capacity, w);
@@ -318,8 +317,8 @@ void enqueue_skin_clusters(Launcher& launcher, const DeviceView& w, const Plan&)
 
 // ---- Positions
 
-// DeviceView::center of the clusters that a vertex hangs on: deep in the tissue nobody asks. made: in frames with
-// Counters::changing that has been done.
+// DeviceView::center of the clusters that carry vertices; others need none. made: in frames with Counters::changing
+// they are done.
 template <class Block>
 CUTPROOF_DEVICE void recenter_clusters_kernel(Block& block, const DeviceView& w, bool made) {
   using namespace skin_detail;
@@ -341,10 +340,11 @@ CUTPROOF_DEVICE inline Float3 arm_of(const BodyConstants& body, int direction, f
   return {direction / 2 == 0 ? far : 0.0f, direction / 2 == 1 ? far : 0.0f, direction / 2 == 2 ? far : 0.0f};
 }
 
-// How far from its owner a vertex lies that a cut brings about, given how far from the plane of the blade the two ends
-// of its grid edge are carried [h]: where the edge crosses the plane, within [1/16, 15/16], and the nearer to alpha the
-// farther the plane is from the edge, or the flatter the edge lies to it (docs/design/method.md §8). t is off by what
-// the heights are, over their difference; what is made of it never by more than 16 times what they are.
+// Distance of a new cut vertex from its owner. `owner`, `end`: heights over the blade's plane to which the ends of its
+// grid edge are carried [h]. The vertex goes where the edge crosses the plane, within [1/16, 15/16]. It comes nearer to
+// alpha the farther the plane is from the edge, or the flatter the edge lies to it (docs/design/method.md §8). The
+// error of t is that of the heights over their difference; the error of the result is at most 16 times that of the
+// heights.
 CUTPROOF_DEVICE inline float cut_reach(float owner, float end, float alpha) {
   constexpr float kLeast = static_cast<float>(kLeastCrossing) / kCrossingSteps, kGreatest = 1.0f - kLeast,
                   kFlat = 0.25f;
@@ -356,7 +356,7 @@ CUTPROOF_DEVICE inline float cut_reach(float owner, float end, float alpha) {
   return alpha + fminf(1.0f, fabsf(owner - end) / kFlat) * (crossing - alpha);
 }
 
-// Where the plane of the blade crosses the edge, as p's clusters carry it; alpha without a blade.
+// Where the blade's plane crosses the edge, as p's clusters carry both; alpha without a blade.
 CUTPROOF_DEVICE inline float reach_by_blade(const DeviceView& w, const BodyConstants& body, int b, int p,
                                             int direction) {
   const Plane plane = lowered_plane(w, body, b);
@@ -392,7 +392,7 @@ CUTPROOF_DEVICE void place_vertices_kernel(Block& block, const DeviceView& w, bo
 }
 CUTPROOF_KERNEL(place_vertices_kernel);
 
-// made: as said above.
+// made: as for the centres.
 template <class Launcher>
 void enqueue_skin_positions(Launcher& launcher, const DeviceView& w, bool made) {
   launcher.teams(recenter_clusters_kernel_object{}, kCenterTeam, w.slots_expected, w, made);

@@ -19,7 +19,7 @@ struct SkinTable {
 
 namespace skin_detail {
 
-// Whether one of the cell's six faces holds both edges.
+// Whether one of the cell's six faces contains both edges.
 CUTPROOF_BOTH constexpr bool share_face(const SkinTable& table, int a, int b) {
   for (int axis = 0; axis < 3; ++axis) {
     if (axis == table.axis[a] || axis == table.axis[b]) continue;
@@ -36,8 +36,8 @@ CUTPROOF_BOTH constexpr int edge_between(const SkinTable& table, int a, int b) {
   return -1;
 }
 
-// Position in a polygon of cell edges from which it is fanned: the first vertex whose diagonals never join two vertices
-// of one cell face. -1: there is none.
+// The position where the fan of a polygon of cell edges begins: the first vertex whose diagonals never join two
+// vertices of one cell face; -1: none.
 CUTPROOF_BOTH constexpr int fan_start(const SkinTable& table, const int* polygon, int size) {
   for (int start = 0; start < size; ++start) {
     bool legal = true;
@@ -49,10 +49,10 @@ CUTPROOF_BOTH constexpr int fan_start(const SkinTable& table, const int* polygon
   return -1;
 }
 
-// For each crossed edge of case `inside` the next one of its polygon; -1 for the others. Round each face, seen from
-// outside the cell, counter-clockwise: the contour runs from where the walk enters tissue to where it leaves it again.
-// So on an ambiguous face each of the two inside corners is cut off by itself, and the tissue lies on the side that
-// makes polygons counter-clockwise seen from outside it.
+// For each crossed edge of case `inside` the next one of its polygon; -1 for the others. Faces are walked
+// counter-clockwise, seen from outside the cell. The contour runs from where the walk enters tissue to where it leaves
+// it. So on an ambiguous face each of the two inside corners is separate. Polygons are counter-clockwise seen from
+// outside the tissue.
 CUTPROOF_BOTH constexpr void link_edges(const SkinTable& table, int inside, int* next) {
   for (int e = 0; e < 12; ++e) next[e] = -1;
   for (int axis = 0; axis < 3; ++axis) {
@@ -121,7 +121,7 @@ CUTPROOF_BOTH constexpr SkinTable make_skin_table() {
   return table;
 }
 
-// Made by the compiler; on the device it lies in global memory, because cells of a warp read different cases.
+// Computed by the compiler; in global memory on the device, because cells of a warp read different cases.
 CUTPROOF_BOTH inline const SkinTable& skin_table() {
   static constexpr SkinTable table = make_skin_table();
   static_assert(table.complete, "A case of a grid cell has a polygon that is open or cannot be fanned.");

@@ -1,5 +1,5 @@
-// Ascending lists of different numbers: making one, searching in one, uniting two. Merge and expand use them on the
-// members of clusters. A list is anything that operator[] gives numbers of.
+// Ascending lists of distinct numbers: making, searching and uniting them. Merge and expand use them for members of
+// clusters. A list is any type whose operator[] gives numbers.
 #pragma once
 #include "gpu/launch/block.h"
 #include "gpu/state/device_view.h"
@@ -8,9 +8,9 @@ namespace cutproof::gpu {
 
 inline constexpr int kListThreads = 512;
 
-// give(n, k) for the k in [begin, end) that are wanted, n being `before` and how many before it are. Reached by all
-// threads of one block; returns the n behind the last. wanted() is asked once for each k, a tile ahead of give(): it
-// must not depend on what give() writes.
+// give(n, k) for each wanted k in [begin, end), where n is `before` plus the number of earlier wanted ones. Returns the
+// n behind the last. Reached by all threads of one block. wanted() is asked once for each k, a tile ahead of give(), so
+// it must not depend on what give() writes.
 template <class Block, class Wanted, class Give>
 CUTPROOF_DEVICE int count_off(Block& block, int begin, int end, int before, Wanted wanted, Give give) {
   constexpr int kEach = 8;  // neighbours of a thread
@@ -23,7 +23,7 @@ CUTPROOF_DEVICE int count_off(Block& block, int begin, int end, int before, Want
   for (int tile = begin; tile < end; tile += kEach * block.size()) {
     const int first = tile + kEach * block.thread();
     const unsigned is = next;
-    next = wanted_from(first + kEach * block.size());  // on its way while this tile is counted
+    next = wanted_from(first + kEach * block.size());  // read while this tile is counted
     int own = 0, total = 0;
     for (int k = 0; k < kEach; ++k) own += is >> k & 1u;
     int n = before + block.exclusive_scan(own, total);
@@ -35,7 +35,7 @@ CUTPROOF_DEVICE int count_off(Block& block, int begin, int end, int before, Want
   return before;
 }
 
-// How many numbers of the list are less than `value`.
+// The number of entries less than `value`.
 template <class List, class Value>
 CUTPROOF_DEVICE inline int lower_bound(const List& list, int size, Value value) {
   int low = 0;
@@ -57,7 +57,7 @@ CUTPROOF_DEVICE inline bool contains(const List& list, int size, int value) {
   return place < size && list[place] == value;
 }
 
-// Which numbers of `list` are missing in `other`: a count for the whole block.
+// Counts, for the whole block, the numbers of `list` missing in `other`.
 template <class Block, class List, class Other>
 CUTPROOF_DEVICE int count_missing(Block& block, const List& list, int size, const Other& other, int other_size) {
   int missing = 0;
@@ -65,12 +65,11 @@ CUTPROOF_DEVICE int count_missing(Block& block, const List& list, int size, cons
   return block.sum(missing);
 }
 
-// Writes those numbers of `list` that go into the union of `list` and `other` where they belong: all of them, or only
-// those that `other` does not have.
+// Writes numbers of `list` to their places in the union of `list` and `other`: all, or only those missing in `other`.
 template <class Block, class List, class Other>
 CUTPROOF_DEVICE int write_part_of_union(Block& block, const List& list, int size, const Other& other, int other_size,
                                         bool common_too, int* out) {
-  int common = 0;  // numbers that both have, so far
+  int common = 0;  // numbers common to both, so far
   for (int begin = 0; begin < size; begin += block.size()) {
     const int k = begin + block.thread();
     const int value = k < size ? list[k] : 0;
@@ -84,8 +83,8 @@ CUTPROOF_DEVICE int write_part_of_union(Block& block, const List& list, int size
   return common;
 }
 
-// Writes the union of `a` and `b` to `out`, which overlaps neither, and gives its size. All threads of the block call
-// this; the result is there for all of them after the next sync().
+// Writes the union of `a` and `b` to `out`, which overlaps neither, and returns its size. Called by all threads of the
+// block, which see the result after the next sync().
 template <class Block, class A, class B>
 CUTPROOF_DEVICE int write_union(Block& block, const A& a, int a_size, const B& b, int b_size, int* out) {
   write_part_of_union(block, a, a_size, b, b_size, true, out);
@@ -98,8 +97,8 @@ CUTPROOF_DEVICE void mark_unsorted(Block& block, const DeviceView& w, int p) {
   block.store(&w.unsorted[p / kParticleTile], 1);
 }
 
-// visit(h, slot) for the places h of p's memberships, in which slot is, or -1. Several are read before the first is
-// visited: one by one, each would wait for the one before.
+// visit(h, slot) for the places h of p's memberships; slot may be -1. Several are read before the first visit: one by
+// one, each would wait for the previous one.
 template <class Block, class Visit>
 CUTPROOF_DEVICE void each_membership(Block& block, const DeviceView& w, int p, Visit visit) {
   constexpr int kAtOnce = 4;
@@ -113,7 +112,7 @@ CUTPROOF_DEVICE void each_membership(Block& block, const DeviceView& w, int p, V
   }
 }
 
-// Memberships of a particle in ascending order, -1 last.
+// Puts a particle's memberships in ascending order, -1 last.
 CUTPROOF_DEVICE inline void sort_memberships(const DeviceView& w, int64_t p) {
   for (int end = w.membership_begin[p] + 1; end < w.membership_begin[p + 1]; ++end) {
     const int moving = w.memberships[end];

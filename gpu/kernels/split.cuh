@@ -1,14 +1,14 @@
-// Stage split (method.md §5): every cluster that holds a particle that is dead becomes the connected components of what
-// is left of it, all clusters at once.
+// Stage split (method.md §5): every cluster with a dead particle becomes the connected components of its rest, all
+// clusters at once.
 //
-// The graph to be labelled has a node for each (cluster, particle) pair, known by its place in DeviceView::members, and
-// an edge where two particles of one cluster are neighbours in G. Members ascend within a cluster, so the place of a
-// component's smallest particle is its smallest place, and that is its label, whichever way it was found:
-// - SplitMethod::global_labels: hooking over all pairs at once in global memory, in the manner of ECL-CC;
-// - SplitMethod::blocks: a block for each cluster, which does the same in shared memory.
+// The labelled graph has a node for each (cluster, particle) pair, known by its place in DeviceView::members, and an
+// edge where two particles of one cluster are neighbours in G. Members ascend within a cluster, so a component's
+// smallest particle has its smallest place. That place is the component's label, with both methods:
+// - SplitMethod::global_labels: hooking over all pairs at once in global memory, as ECL-CC does;
+// - SplitMethod::blocks: the same in shared memory, a block for each cluster.
 //
-// Then components are counted, which gives each its slot and number, and the members of a cluster are regrouped within
-// the places that they have: a split needs new slots, but no new places.
+// Then components are counted, which gives each its slot and number. A cluster's members are regrouped within their
+// places: a split needs new slots, but no new places.
 #pragma once
 #include <cstdint>
 
@@ -21,40 +21,40 @@
 
 namespace cutproof::gpu {
 
-// A cluster with more members is labelled in global memory whatever the plan says.
+// A larger cluster is labelled in global memory whatever the plan says.
 inline constexpr int kMostInBlock = 4096;
 
 namespace split_detail {
 
-// Blocks as large as most clusters: one waits for memory as long for all of its particles as for one.
+// As large as most clusters: a block waits for memory as long for all its particles as for one.
 inline constexpr int kLabelThreads = 512, kRegroupThreads = 512;
-// Components that are gone through one by one when a cluster's members are regrouped.
+// Most components of a cluster that regrouping scans one by one.
 inline constexpr int kMostScanned = 4;
-// How many blocks share the pairs of one cluster in global_labels.
+// Pairs of a cluster for each block of global_labels.
 inline constexpr int kPairsPerBlock = 1024;
 inline constexpr int kMostShares = 64;
 
-// The directions of a particle's lower neighbours, smallest first, d = 0, 1, 2: -z, -y, -x. Particles are numbered as
-// their nodes are.
+// Directions of a particle's lower neighbours, smallest first, d = 0, 1, 2: -z, -y, -x. Particles are numbered like
+// their nodes.
 CUTPROOF_BOTH inline constexpr int lower_direction(int d) { return 5 - 2 * d; }
 
 CUTPROOF_DEVICE inline int body_index(const DeviceView& w, int p) { return w.bodies == 1 ? 0 : w.body_of[p]; }
 
-// What Counters::scratch holds, until there are new lists: from then on the skin has it.
+// Use of Counters::scratch until there are new lists; then the skin uses it.
 enum : int { kNewClusters = 0, kFirstNewNumber = 1, kTooLarge = 2 };
 
-// The quarters of DeviceView::slot_scratch. By place in DeviceView::affected: how many components need a new slot; the
-// same of all before; several bodies: the number of the first of them. By slot: marks, then places that are filled
-// next.
+// The quarters of DeviceView::slot_scratch. By place in DeviceView::affected: the number of components that need a new
+// slot; the same number over all earlier places; with several bodies, the number of the first such component. By slot:
+// marks, then the next places to fill.
 CUTPROOF_BOTH inline int* extra_components(const DeviceView& w) { return w.slot_scratch; }
 CUTPROOF_BOTH inline int* extra_before(const DeviceView& w) { return w.slot_scratch + int64_t{1} * w.slot_capacity; }
 CUTPROOF_BOTH inline int* first_number(const DeviceView& w) { return w.slot_scratch + int64_t{2} * w.slot_capacity; }
 CUTPROOF_BOTH inline int* by_slot(const DeviceView& w) { return w.slot_scratch + int64_t{3} * w.slot_capacity; }
 
-// Where among the k smallest members of a cluster the neighbour of member k in a lower direction stands; -1: nowhere.
+// The position of member k's lower neighbour among the k smallest members of a cluster; -1: none.
 template <class Members>
 CUTPROOF_DEVICE int place_of_lower(const Members& members, int k, int neighbour, int direction) {
-  if (direction == 1) {  // the neighbour at -x, if there is one, is the particle before
+  if (direction == 1) {  // a neighbour at -x is the previous particle
     return k > 0 && members[k - 1] == neighbour ? k - 1 : -1;
   }
   const int place = lower_bound(members, k, neighbour);
@@ -63,18 +63,18 @@ CUTPROOF_DEVICE int place_of_lower(const Members& members, int k, int neighbour,
 
 // ---- debris
 
-// Bodies whose small components are to be taken out now. Once that has been done, a component can only become too small
-// where particles die: then it is looked for from there, unless it may have too many particles for that.
+// Bodies that remove small components now. After the first search a component can become too small only where particles
+// die. So it is searched from there, unless it may have too many particles for that.
 inline constexpr int kMostSearched = 32;
 CUTPROOF_DEVICE inline bool drops_debris(const DeviceView& w, int b) { return w.body[b].debris > 0 && cut_now(w, b); }
 CUTPROOF_DEVICE inline bool labels_tissue(const DeviceView& w, int b) {
   return drops_debris(w, b) && (w.debris_anywhere[b] != 0 || w.body[b].debris > kMostSearched);
 }
 
-// DeviceView::particle_scratch: the parents of the particles, then the sizes of their components.
+// DeviceView::particle_scratch: parents of particles, then sizes of components.
 CUTPROOF_BOTH inline int* component_size(const DeviceView& w) { return w.particle_scratch + w.particles; }
 
-// Lists p, which is debris.
+// Lists p as debris.
 template <class Block>
 CUTPROOF_DEVICE void add_debris(Block& block, const DeviceView& w, int p) {
   w.fallen[w.counters->fallen + block.atomic_add(&w.counters->debris, 1)] = p;
@@ -82,7 +82,7 @@ CUTPROOF_DEVICE void add_debris(Block& block, const DeviceView& w, int p) {
 
 }  // namespace split_detail
 
-// Clears what list_fallen counts. One thread.
+// Clears the counters of list_fallen. One thread.
 template <class Block>
 CUTPROOF_DEVICE void begin_split_kernel(Block& block, DeviceView w) {
   if (block.first() != 0) return;
@@ -98,8 +98,8 @@ CUTPROOF_DEVICE void begin_split_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(begin_split_kernel);
 
-// The dead of this frame, and all others that clusters still hold. What a split earlier in this frame has taken out
-// leaves the list of debris, which this one replaces.
+// Lists the dead of this frame and all others still in clusters. An earlier split's debris leaves the list, which this
+// split writes anew.
 template <class Block>
 CUTPROOF_DEVICE void list_fallen_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
@@ -135,7 +135,7 @@ CUTPROOF_DEVICE void link_tissue_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(link_tissue_kernel);
 
-// link_tissue has seen to the direction -z.
+// link_tissue does the direction -z.
 template <class Block>
 CUTPROOF_DEVICE void hook_tissue_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
@@ -150,7 +150,7 @@ CUTPROOF_DEVICE void hook_tissue_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(hook_tissue_kernel);
 
-// Sizes are counted up to where they no longer matter.
+// Counts sizes up to where they no longer matter.
 template <class Block>
 CUTPROOF_DEVICE void measure_tissue_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
@@ -178,8 +178,8 @@ CUTPROOF_DEVICE void remove_debris_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL(remove_debris_kernel);
 
-// The component of each living neighbour of a fallen particle, as far as it matters. Several threads may come upon the
-// same: what another one takes out meanwhile still counts as tissue.
+// The component of each living neighbour of a fallen particle, as far as it matters. Several threads may find the same
+// one: particles that another thread removes meanwhile still count as tissue.
 template <class Block>
 CUTPROOF_DEVICE void search_debris_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
@@ -215,7 +215,7 @@ CUTPROOF_KERNEL(search_debris_kernel);
 
 // ---- which clusters
 
-// By I2 no cluster held a dead particle when the frame began: one that holds one now has lost it.
+// By I2 no cluster contained a dead particle when the frame began, so a dead member was lost in this frame.
 template <class Block>
 CUTPROOF_DEVICE void mark_affected_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
@@ -245,7 +245,7 @@ CUTPROOF_KERNEL_THREADS(list_affected_kernel, kListThreads);
 
 // ---- labels
 
-// A block for each affected cluster of at most `most` members; its shared memory holds them and their parents.
+// A block for each affected cluster of at most `most` members; shared memory has them and their parents.
 template <class Block>
 CUTPROOF_DEVICE void label_in_blocks_kernel(Block& block, DeviceView w, int most) {
   using namespace split_detail;
@@ -269,7 +269,7 @@ CUTPROOF_DEVICE void label_in_blocks_kernel(Block& block, DeviceView w, int most
       for (int d = 0; d < 3; ++d) member.lower[d] = neighbour(w, body, member.particle, lower_direction(d));
       return member;
     };
-    // A thread has hardly ever more than one.
+    // A thread hardly ever has more than one.
     const int own = block.thread();
     Member first_own;
     if (own < size) first_own = ask(own);
@@ -289,7 +289,7 @@ CUTPROOF_DEVICE void label_in_blocks_kernel(Block& block, DeviceView w, int most
         if (q < 0) continue;
         const int place = place_of_lower(members, k, q, lower_direction(d));
         if (place < 0 || peek<Memory::shared>(block, &parent[place]) < 0) continue;
-        // The first needs no search for roots, unless somebody has hooked k before.
+        // The first needs no search for roots, unless another thread has hooked k before.
         const bool hooked = first && block.atomic_cas(&parent[k], k, place) == k;
         if (!hooked) unite<Memory::shared>(block, parent, k, place);
         first = false;
@@ -310,8 +310,8 @@ CUTPROOF_DEVICE void label_in_blocks_kernel(Block& block, DeviceView w, int most
 }
 CUTPROOF_KERNEL_THREADS(label_in_blocks_kernel, split_detail::kLabelThreads);
 
-// The pairs of each affected cluster with more than `most` members, shared out among `shares` blocks: calls
-// visit(slot, members, k) for k in [0, slot_size).
+// Calls visit(slot, k), k in [0, slot_size), for the pairs of each affected cluster with more than `most` members,
+// distributed over `shares` blocks.
 namespace split_detail {
 template <class Block, class Visit>
 CUTPROOF_DEVICE void for_large_clusters(Block& block, const DeviceView& w, int most, int shares, Visit visit) {
@@ -346,7 +346,7 @@ CUTPROOF_DEVICE void link_pairs_kernel(Block& block, DeviceView w, int most, int
 }
 CUTPROOF_KERNEL(link_pairs_kernel);
 
-// link_pairs has seen to the direction -z.
+// link_pairs does the direction -z.
 template <class Block>
 CUTPROOF_DEVICE void hook_pairs_kernel(Block& block, DeviceView w, int most, int shares) {
   using namespace split_detail;
@@ -386,8 +386,8 @@ CUTPROOF_KERNEL(flatten_pairs_kernel);
 
 // ---- slots and numbers
 
-// New numbers go on from the highest that the body uses, in the order (cluster, smallest particle). A block for each
-// body. Also looks whether the capacity suffices.
+// New numbers follow the body's highest, in the order (cluster, smallest particle). A block for each body. Also checks
+// the capacity.
 template <class Block>
 CUTPROOF_DEVICE void number_components_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
@@ -401,7 +401,7 @@ CUTPROOF_DEVICE void number_components_kernel(Block& block, DeviceView w) {
   }
   for (int b = block.index(); b < w.bodies; b += block.count()) {
     if (!cut_now(w, b)) continue;
-    // In a body numbers ascend with slots, so the last of its clusters has the highest.
+    // In a body numbers ascend with slots, so its last cluster has the highest.
     int highest = -1;
     for (int end = counters.slots_used; end > 0 && highest < 0; end -= block.size()) {
       const int s = end - 1 - block.thread();
@@ -429,7 +429,7 @@ CUTPROOF_KERNEL(number_components_kernel);
 
 namespace split_detail {
 
-// Where the slots that are left are too few for the stage.
+// For a stage that lacks slots.
 template <class Block>
 CUTPROOF_DEVICE void put_back_debris(Block& block, const DeviceView& w) {
   if (block.index() != 0) return;
@@ -443,7 +443,7 @@ CUTPROOF_DEVICE void put_back_debris(Block& block, const DeviceView& w) {
   if (block.thread() == 0) counters.debris = 0;
 }
 
-// In the list of p's clusters `to` takes the place of `from`. Each block renames a slot of its own.
+// In p's list of clusters `to` replaces `from`. Each block renames a slot of its own.
 template <class Block>
 CUTPROOF_DEVICE void rename_holder(Block& block, const DeviceView& w, int p, int from, int to) {
   mark_unsorted(block, w, p);
@@ -455,9 +455,9 @@ CUTPROOF_DEVICE void rename_holder(Block& block, const DeviceView& w, int p, int
 
 }  // namespace split_detail
 
-// A block for each affected cluster. Its first component keeps slot and number; component c > 0, in the order of
-// smallest particles, gets the c-th of the cluster's new slots, which count as given out from now on. Members stay
-// within their places: component after component, each ascending; the places of the dead are left over at the end.
+// A block for each affected cluster. Its first component keeps slot and number. Component c > 0, ordered by smallest
+// particle, gets the c-th of the cluster's new slots, which count as used from now on. Members stay within the
+// cluster's places: component after component, each ascending; the places of the dead remain at the end.
 template <class Block>
 CUTPROOF_DEVICE void regroup_members_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
@@ -472,7 +472,7 @@ CUTPROOF_DEVICE void regroup_members_kernel(Block& block, DeviceView w) {
     const int s = w.affected[a], begin = w.slot_begin[s], size = w.slot_size[s];
     const int first_new = counters.slots_before + extra_before(w)[a];
     const int number = w.bodies == 1 ? counters.scratch[kFirstNewNumber] + extra_before(w)[a] : first_number(w)[a];
-    int* const fill = by_slot(w);  // first the size of a component, then the place that it fills next
+    int* const fill = by_slot(w);  // first a component's size, then its next place to fill
     int* const slot_of_root = w.member_scratch + begin;
     int* const regrouped = w.member_scratch;
 
@@ -507,7 +507,7 @@ CUTPROOF_DEVICE void regroup_members_kernel(Block& block, DeviceView w) {
     }
     block.sync();
 
-    int left = 0;  // places taken by components before
+    int left = 0;  // places of earlier components
     for (int from = 0; from < components; from += block.size()) {
       const int c = from + block.thread();
       const int t = c == 0 ? s : first_new + c - 1;
@@ -525,7 +525,7 @@ CUTPROOF_DEVICE void regroup_members_kernel(Block& block, DeviceView w) {
     block.sync();
 
     // Members in ascending order, a chunk at a time: each goes behind those of its component that are before it.
-    int done[kMostScanned] = {};  // how many of a component are in chunks before, if there are few components
+    int done[kMostScanned] = {};  // members of each component in earlier chunks, if there are few components
     for (int from = 0; from < size; from += block.size()) {
       const int k = from + block.thread();
       const int t = k < size ? w.label[begin + k] : -1;
@@ -564,7 +564,7 @@ CUTPROOF_DEVICE void regroup_members_kernel(Block& block, DeviceView w) {
 }
 CUTPROOF_KERNEL_THREADS(regroup_members_kernel, split_detail::kRegroupThreads);
 
-// Of what is left of affected clusters, and of the new ones.
+// Of the rests of affected clusters, and of the new clusters.
 template <class Block>
 CUTPROOF_DEVICE void rest_frames_of_components_kernel(Block& block, DeviceView w) {
   using namespace split_detail;
@@ -580,7 +580,7 @@ CUTPROOF_DEVICE void rest_frames_of_components_kernel(Block& block, DeviceView w
 }
 CUTPROOF_KERNEL(rest_frames_of_components_kernel);
 
-// All but the rest frames, for which nobody asks until clusters are united.
+// Without rest frames, which are needed only when clusters are united.
 template <class Launcher>
 void enqueue_components(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   using namespace split_detail;
@@ -599,7 +599,7 @@ void enqueue_components(Launcher& launcher, const DeviceView& w, const Plan& pla
   launcher.items(mark_affected_kernel_object{}, w.particles, w);
   launcher.blocks(list_affected_kernel_object{}, 1, kListThreads, 0, w);
 
-  // Merging keeps to the cap, which plan.largest_cluster includes; expansion may pass any size.
+  // Merging keeps to the cap, which plan.largest_cluster includes; expansion has no limit.
   const int largest = plan.largest_cluster < 1 ? 1 : plan.largest_cluster;
   const bool in_blocks = plan.split == SplitMethod::blocks;
   const int most = !in_blocks ? 0 : largest < kMostInBlock ? (largest + 31) / 32 * 32 : kMostInBlock;
@@ -627,7 +627,7 @@ template <class Launcher>
 void enqueue_rest_frames_of_components(Launcher& launcher, const DeviceView& w) {
   launcher.teams(rest_frames_of_components_kernel_object{}, kRestTeam, 2 * int64_t{w.slots_expected}, w);
 }
-// All of it, for who runs nothing beside it.
+// The whole stage, for callers without parallel work.
 template <class Launcher>
 void enqueue_split(Launcher& launcher, const DeviceView& w, const Plan& plan) {
   enqueue_components(launcher, w, plan);

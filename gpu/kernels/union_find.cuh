@@ -1,17 +1,16 @@
-// Disjoint sets that many threads join at once, in the manner of ECL-CC (Jaiganesh and Burtscher 2018): parent[i] <= i,
-// a root is its own parent, and a set is known by its smallest member.
+// Disjoint sets that many threads join at once, as ECL-CC does (Jaiganesh and Burtscher 2018). parent[i] <= i, a root
+// is its own parent, and a set is known by its smallest member.
 //
-// Why every schedule gives the same roots: parent[i] only ever names an ancestor of i, and once i has a parent other
-// than itself it never becomes a root again. So whatever a thread reads, however old, leads upwards; a root is hooked
-// by compare-and-swap alone, which fails if it has stopped being one; and shortening a path writes to members that are
-// no roots, so it never undoes a hook.
+// Every schedule gives the same roots. parent[i] only ever names an ancestor of i, and an i with another parent never
+// becomes a root again. So any value that a thread reads, however old, leads upwards. Only compare-and-swap hooks a
+// root, and it fails if that is no longer a root. Path shortening writes only to non-roots, so it never undoes a hook.
 #pragma once
 #include "gpu/launch/block.h"
 
 namespace cutproof::gpu {
 
-// Where the sets lie. In shared memory plain reads beside another thread's writes are hazards to the tools that look
-// for them, and atomics cost no more there; in global memory relaxed loads and stores do.
+// Where the sets lie. In shared memory race detectors report plain reads beside another thread's writes as hazards, and
+// atomics cost no more; in global memory relaxed loads and stores suffice.
 enum class Memory { global, shared };
 
 template <Memory memory, class Block>
@@ -33,7 +32,7 @@ template <Memory memory = Memory::global, class Block>
 CUTPROOF_DEVICE int find_root(Block& block, int* parent, int i) {
   int at = peek<memory>(block, &parent[i]);
   if (at == i) return i;
-  int below = i;  // its parent was `at`: it is no root
+  int below = i;  // its parent was `at`, so it is no root
   for (int above = peek<memory>(block, &parent[at]); above != at; above = peek<memory>(block, &parent[at])) {
     poke<memory>(block, &parent[below], above);
     below = at;
@@ -42,7 +41,7 @@ CUTPROOF_DEVICE int find_root(Block& block, int* parent, int i) {
   return at;
 }
 
-// Makes one set of those of i and j.
+// Unites the sets of i and j.
 template <Memory memory = Memory::global, class Block>
 CUTPROOF_DEVICE void unite(Block& block, int* parent, int i, int j) {
   int a = find_root<memory>(block, parent, i);
@@ -51,12 +50,12 @@ CUTPROOF_DEVICE void unite(Block& block, int* parent, int i, int j) {
     const int high = a < b ? b : a, low = a < b ? a : b;
     const int found = block.atomic_cas(&parent[high], high, low);
     if (found == high) return;
-    a = found;  // it has been hooked meanwhile: go on from its parent, which is smaller
+    a = found;  // hooked meanwhile: continue from its parent, which is smaller
     b = low;
   }
 }
 
-// The root of i when nothing is united any more. Changes nothing, so roots may be stored into `parent` meanwhile.
+// The root of i after the last union. Changes nothing, so roots may be stored into `parent` meanwhile.
 template <class Block>
 CUTPROOF_DEVICE int final_root(Block& block, const int* parent, int i) {
   int at = i;

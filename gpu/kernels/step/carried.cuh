@@ -1,5 +1,5 @@
-// An iteration of a carried group, whose map is advanced and not its particles; and of a held group, whose map says how
-// much a grip pushes them.
+// An iteration of a carried group advances its map instead of its particles. An iteration of a held group: its map has
+// the push of the grip.
 #pragma once
 #include "gpu/kernels/step/affine_map.cuh"
 #include "gpu/kernels/step/bodies.cuh"
@@ -14,8 +14,8 @@
 
 namespace cutproof::gpu::step_detail {
 
-// Advances a group that has been carried until now by an iteration. If it may touch a contact in this iteration, says
-// so and does nothing.
+// Advances a group that has been carried so far by an iteration. If it may touch a contact in this iteration, returns
+// true and changes nothing.
 template <bool kContacts, bool kAccelerated, bool kRetarded, class Block, int kRows>
 CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& team, const DeviceView& w, int g,
                                      int substep, int iteration) {
@@ -51,14 +51,14 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
     lower = constant(&w.group_spread[2 * int64_t{g} + 1]);
     if (more) team.each(3, [&](int axis) { of_prediction.of(axis) = w.group_predicted[3 * int64_t{g} + axis]; });
   };
-  constexpr bool kAllAhead = kRows > 1;  // a single thread lacks registers for so much
+  constexpr bool kAllAhead = kRows > 1;  // a single thread lacks registers for this
   if constexpr (kAllAhead) {
     if (active) {
       team.each(3, read_maps);
       if (state == kCarried) read_moments();  // a held group needs none
     }
   }
-  block.wait_for_earlier();  // for the clusters; all else is older
+  block.wait_for_earlier();  // for the clusters; all other data is older
   if (!active) return false;
   const float lost_next = now.lost_after;
   Rows<Team<Block, kRows>> goals = mean_goal(team, w, head, ahead.holders, pace.h, base), plain, next;
@@ -110,8 +110,8 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
       near = near || !(way_along(plain.of(axis), head.radius) <= kPartOfRoom * room) ||
              (now.combined && !(way_along(next.of(axis), head.radius) <= kPartOfRoom * room));
     });
-    // (With retardation contacts act on x. It lies between y and the start of the substep, which is not at hand. So
-    // the group is resolved, which is always right.)
+    // (With retardation contacts act on x, between y and the start of the substep, which is not at hand. So the group
+    // is resolved, which is always right.)
     if (team.any(near)) {
       if (is_retarded<kRetarded>(pace)) return true;
       const Contacts contacts = contacts_of(w, pace, substep);

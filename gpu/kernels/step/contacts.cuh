@@ -1,7 +1,6 @@
-// Contacts of one particle with the blade and the walls within one substep (method.md §3).
-// Everything works on displacements from rest. A distance to the
-// blade is (X - edge) + d, with X - edge formed once and rounded once, and a projection is added to d. So a particle
-// far from the body's origin loses no more than that one rounding.
+// Contacts of one particle with the blade and the walls within one substep (method.md §3). Everything works on
+// displacements from rest. A distance to the blade is (X - edge) + d, with X - edge formed and rounded once, and a
+// projection is added to d. So a particle far from the body's origin loses no more than that one rounding.
 #pragma once
 #include "gpu/state/device_view.h"
 #include "gpu/state/float3.h"
@@ -18,7 +17,7 @@ struct RestPoint {
   }
 };
 
-// What a body's particles may not enter during one substep.
+// The forbidden set of a body's particles in one substep.
 struct Contacts {
   const WallF* walls;
   int wall_count;
@@ -32,7 +31,7 @@ CUTPROOF_DEVICE inline Contacts contacts_of(const DeviceView& w, const Pace& pac
   contacts.walls = w.walls + pace.wall_begin;
   contacts.wall_count = pace.wall_count;
   contacts.move = nullptr;
-  if (pace.first_move >= 0 && substep < pace.substeps) {  // asked for before it is known whether there is that substep
+  if (pace.first_move >= 0 && substep < pace.substeps) {  // read before the substep is known to exist
     const MoveF* const move = w.moves + (pace.first_move + substep);
     if (constant(&move->down) != 0) contacts.move = move;
   }
@@ -79,7 +78,8 @@ CUTPROOF_DEVICE inline Float3 off_walls(const Contacts& contacts, const RestPoin
   return d;
 }
 
-// In the blade's frame: whether a point is over the mid-surface, and what leads to it from there.
+// In the blade's frame: whether a point is over the mid-surface, and the vector from the nearest point of the
+// mid-surface.
 CUTPROOF_DEVICE inline bool is_over_blade(const Contacts& contacts, Float3 c) {
   return fabsf(c.x) < contacts.half_length && c.y > 0 && c.y < contacts.depth;
 }
@@ -88,9 +88,9 @@ CUTPROOF_DEVICE inline Float3 from_blade(const Contacts& contacts, Float3 c) {
           c.y - fminf(fmaxf(c.y, 0.0f), contacts.depth), c.z};
 }
 
-// The way out, in the blade's frame, of a particle that came through the plate. It leads back to its own side, or round
-// one of the four sides of the rectangle to where it clears the rounded rim. The shortest way is taken, and of equal
-// ways the one to its own side.
+// The way out, in the blade's frame, of a particle that passed through the plate: back to its own side, or round one of
+// the rectangle's four sides to where it clears the rounded rim. The shortest way counts, of equal ways the one to its
+// own side.
 CUTPROOF_DEVICE inline Float3 way_out(const Contacts& contacts, Float3 c, float side) {
   Float3 best = {0, 0, side * contacts.clearance - c.z};
   float shortest = dot(best, best);
@@ -110,9 +110,9 @@ CUTPROOF_DEVICE inline Float3 way_out(const Contacts& contacts, Float3 c, float 
   return best;
 }
 
-// The way of a particle off the blade, zero where it is allowed to be. Two sets are forbidden: what is nearer to the
-// mid-surface than the clearance, and what lies over it on the other side than where the particle began. The way is not
-// the difference of two positions, which would have no direction where it is short. Requires contacts.move.
+// The displacement of a particle off the blade, zero where it is allowed. Two sets are forbidden: points nearer to the
+// mid-surface than the clearance, and points over it on the side where the particle did not begin. A difference of two
+// positions would lose its direction where it is short. Requires contacts.move.
 CUTPROOF_DEVICE inline Float3 way_off_blade(const Contacts& contacts, const RestPoint& rest, Float3 d, float side) {
   const PoseF pose = constant(&contacts.move->to);
   const Float3 c = into_frame(pose, rest.from(pose.edge) + d);
@@ -150,10 +150,10 @@ CUTPROOF_DEVICE inline bool touches(const Contacts& contacts, const RestPoint& r
   return norm(from_blade(contacts, c)) < contacts.clearance + margin;
 }
 
-inline constexpr int kMostTurns = 16;  // of blade and walls, where both hold at once
+inline constexpr int kMostTurns = 16;  // alternating projections on blade and walls
 
-// The allowed point nearest to d: exactly, unless blade and walls both move it. Then they do in turn, the blade last,
-// and `in_turn` is set.
+// The allowed point nearest to d, exact unless blade and walls both move it. Then their projections alternate, the
+// blade last, and `in_turn` is set.
 CUTPROOF_DEVICE inline Float3 allowed(const Contacts& contacts, const RestPoint& rest, Float3 d, float side,
                                       bool& in_turn) {
   if (contacts.move == nullptr) return off_walls(contacts, rest, d);
@@ -171,7 +171,7 @@ CUTPROOF_DEVICE inline Float3 allowed(const Contacts& contacts, const RestPoint&
   }
 }
 
-// Takes back at most `reach` of the sliding `slid` along the surface with the given normal.
+// Reduces the slip `slid` along the surface with this normal by at most `reach`.
 CUTPROOF_DEVICE inline Float3 rubbed(Float3 d, Float3 slid, Float3 normal, float reach) {
   const Float3 along = slid - dot(slid, normal) * normal;
   const float length = norm(along);
@@ -180,15 +180,15 @@ CUTPROOF_DEVICE inline Float3 rubbed(Float3 d, Float3 slid, Float3 normal, float
 
 }  // namespace contacts_detail
 
-// The side of the blade, +1 or -1, on which a particle stands when the substep begins.
+// The side of the blade, +1 or -1, of a particle when the substep begins.
 CUTPROOF_DEVICE inline float blade_side(const Contacts& contacts, const RestPoint& rest, Float3 d) {
   if (contacts.move == nullptr) return 1.0f;
   const PoseF pose = constant(&contacts.move->from);
   return contacts_detail::into_frame(pose, rest.from(pose.edge) + d).z < 0 ? -1.0f : 1.0f;
 }
 
-// Where contacts let a particle be that would be at d. It began the substep at `start`, on side `side` of the blade.
-// Sets `in_turn` where that need not be the nearest allowed point, and leaves it alone elsewhere.
+// The position that contacts allow a particle at d. It began the substep at `start`, on side `side` of the blade. Sets
+// `in_turn` where this need not be the nearest allowed point, and does not change it elsewhere.
 CUTPROOF_DEVICE inline Float3 project(const Contacts& contacts, const RestPoint& rest, Float3 d, float side,
                                       Float3 start, bool& in_turn) {
   using namespace contacts_detail;
@@ -198,7 +198,7 @@ CUTPROOF_DEVICE inline Float3 project(const Contacts& contacts, const RestPoint&
     bool turns = false;
     const Float3 projected = allowed(contacts, rest, result, side, turns);
     in_turn = in_turn || turns;
-    // Blade and wall may both press on a point and leave it where it is: then it is rubbed all the same.
+    // Blade and wall can press on a point without moving it; friction still acts.
     if (rubs || contacts.frictionless || (same(projected, d) && !turns)) return projected;
     result = projected;
     CUTPROOF_ROLLED
@@ -214,7 +214,7 @@ CUTPROOF_DEVICE inline Float3 project(const Contacts& contacts, const RestPoint&
       const Float3 pushed = way_off_blade(contacts, rest, d, side);
       const float depth = norm(pushed);
       if (depth > 0) {
-        // The blade's own point under the particle has moved too; only sliding against it rubs.
+        // The blade's point under the particle has moved too; friction opposes the relative slip only.
         const PoseF from = constant(&contacts.move->from), to = constant(&contacts.move->to);
         const Float3 c = into_frame(to, rest.from(to.edge) + result);
         const Float3 carried = (to.edge - from.edge) + c.x * (to.along - from.along) + c.y * (to.back - from.back) +
@@ -225,9 +225,9 @@ CUTPROOF_DEVICE inline Float3 project(const Contacts& contacts, const RestPoint&
   }
 }
 
-// The same for a solver that comes from x and would go to `free`. Where blade and walls hold at once, projecting in
-// turn need not give the nearest point. There a point that is worse than x is refused, so that the energy cannot grow.
-// Elsewhere the projection is the nearest point, and the question would refuse motions below the root of the rounding.
+// For a solver that moves the particle from x towards `free`. Alternating projections of blade and walls need not give
+// the nearest point, so a point worse than x is rejected and the energy cannot grow. An exact projection needs no such
+// test, which would reject motions below the root of the rounding.
 CUTPROOF_DEVICE inline Float3 next_position(const Contacts& contacts, const RestPoint& rest, Float3 free, float side,
                                             Float3 start, Float3 x) {
   bool in_turn = false;
@@ -239,7 +239,7 @@ CUTPROOF_DEVICE inline Float3 next_position(const Contacts& contacts, const Rest
   return worse ? x : next;
 }
 
-// Points of the body within `radius` of one, all displaced alike.
+// Points of the body within `radius` of one point, all with the same displacement.
 struct Ball {
   RestPoint rest;
   Float3 d;
@@ -248,7 +248,7 @@ struct Ball {
 
 namespace contacts_detail {
 
-// Coordinates are rounded a few times each, by units of the greatest number that is in them.
+// Coordinates are rounded a few times each, by units of their greatest number.
 inline constexpr float kRounds = 32 * 0x1p-24f;
 CUTPROOF_DEVICE inline float extent(Float3 a) { return fabsf(a.x) + fabsf(a.y) + fabsf(a.z); }
 CUTPROOF_DEVICE inline float ball_extent(const Ball& ball) {
@@ -257,18 +257,18 @@ CUTPROOF_DEVICE inline float ball_extent(const Ball& ball) {
 
 }  // namespace contacts_detail
 
-// By how much at least the radius of a ball may grow before some point in it is projected, or touches (kTouchMargin).
-// If that is not positive, the ball is not clear. side: the side of the blade on which all points of the ball began the
-// substep, or 0 if they began on both.
+// The least growth of a ball's radius before some point in it is projected, or touches (kTouchMargin). If it is not
+// positive, the ball is not clear. side: the side of the blade on which all points of the ball began the substep, or 0
+// if they began on both.
 //
-// Keeping away from the plate is not enough: a point over it is projected from any distance if it began on the other
-// side. So either the whole ball stays on its side, or it keeps clear of all that lies over and under the plate.
+// Distance from the plate is not enough: a point over the plate is projected from any distance if it began on the other
+// side. So either the whole ball stays on its side, or it keeps clear of everything over and under the plate.
 CUTPROOF_DEVICE inline float room_around(const Contacts& contacts, const Ball& ball, int side) {
   using namespace contacts_detail;
   const RestPoint& rest = ball.rest;
   const float size = ball_extent(ball);
   const float reach = ball.radius * (1.0f + kRounds) + static_cast<float>(kTouchMargin) * rest.h;
-  const auto least = [](float a, float b) { return a < b || a != a ? a : b; };  // no number, if one of them is none
+  const auto least = [](float a, float b) { return a < b || a != a ? a : b; };  // NaN if one of them is
   float room = 3.0e38f;
   CUTPROOF_ROLLED
   for (int k = 0; k < contacts.wall_count; ++k) {
@@ -285,8 +285,8 @@ CUTPROOF_DEVICE inline float room_around(const Contacts& contacts, const Ball& b
   if (side != 0) of_blade = fmaxf(of_blade, static_cast<float>(side) * c.z - (contacts.clearance + clear));
   return least(room, of_blade);
 }
-// The side of the blade, +1 or -1, on which all points of a ball stand when the substep begins, as blade_side says of
-// each; 0: not certainly all on one.
+// The side of the blade, +1 or -1, of all points of a ball when the substep begins, as blade_side gives for each; 0:
+// not certainly one side.
 CUTPROOF_DEVICE inline int side_of_all(const Contacts& contacts, const Ball& ball) {
   using namespace contacts_detail;
   if (contacts.move == nullptr) return 1;
@@ -299,7 +299,7 @@ CUTPROOF_DEVICE inline bool is_clear(const Contacts& contacts, const Ball& ball,
   return room_around(contacts, ball, side) > 0;
 }
 
-// Friction, or room that is not convex: an iteration can have several fixed points.
+// With friction or a non-convex allowed set an iteration can have several fixed points.
 CUTPROOF_DEVICE inline bool path_matters(const Contacts& contacts) {
   return contacts.move != nullptr || !contacts.frictionless;
 }

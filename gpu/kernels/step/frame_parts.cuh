@@ -1,4 +1,4 @@
-// What is left, in a substep, of the shape and the motion with which a particle began the frame.
+// The remaining parts, in a substep, of the shape and motion with which a particle began the frame.
 //
 // A particle began the frame at d = D + u with velocity v = V + m; D and V belong to its group. Until its group is
 // touched, it moves by b v + T + (a - 1) u + A(r). The map T + A(r) is its group's; the numbers a and b are its body's
@@ -11,7 +11,7 @@
 
 namespace cutproof::gpu::step_detail {
 
-// The parts of the shape u and of the motion v that are left in a displacement or in a velocity.
+// The remaining parts of the shape u and of the motion v in a displacement or in a velocity.
 struct Parts {
   float shape, motion;  // a - 1, which may be small; b
 };
@@ -25,12 +25,10 @@ CUTPROOF_DEVICE inline Parts predicted_parts(const Pace& pace, const FrameParts&
   return {now.place.shape + pace.prediction_time * now.velocity.shape,
           now.place.motion + pace.prediction_time * now.velocity.motion};
 }
-// One moment of what is left of u and v, from the moments of u and of v - V.
 CUTPROOF_DEVICE inline float own_moment(const Parts& now, float of_shape, float of_motion) {
   return (1.0f + now.shape) * of_shape + now.motion * of_motion;
 }
-// After a substep that began with `now`. (These are computed once a frame, so nobody asks first whether some body has
-// retardation.)
+// After a substep that began with `now`. (Computed once a frame, so no test for retardation is needed.)
 CUTPROOF_DEVICE inline FrameParts parts_after(const Pace& pace, float lost, const FrameParts& now) {
   const Parts predicted = predicted_parts(pace, now);
   FrameParts next;

@@ -1,5 +1,4 @@
-// The mean goal of a group: the mean of the affine maps by which its holders, the clusters that contain it, would move
-// it.
+// The mean goal of a group: the mean of the affine maps by which its holders would move it.
 #pragma once
 #include "gpu/kernels/step/affine_map.cuh"
 #include "gpu/kernels/step/group.cuh"
@@ -23,7 +22,7 @@ CUTPROOF_DEVICE inline SomeHolders<kAtOnce> holders_from(const DeviceView& w, co
   return holders;
 }
 
-// A group, and what of it does not change in a substep.
+// A group's data that does not change in a substep.
 template <int kAtOnce>
 struct GroupAhead {
   Group group;
@@ -36,17 +35,17 @@ CUTPROOF_DEVICE inline GroupAhead<kAtOnce> group_ahead(const DeviceView& w, int 
   return {group, holders_from<kAtOnce>(w, group.head, 0), w.group_base[g]};
 }
 // How many holders are read at once. Where lanes share a group, registers suffice for all holders of most groups, and
-// for all else that is read ahead.
+// for everything else that is read ahead.
 template <int kRows>
 inline constexpr int kHoldersAtOnce = kRows > 1 ? 8 : 4;
 
-// The mean goal of a group is base + goal(r). Gives `goal`, each row in the lane that has its axis.
+// The mean goal of a group is base + goal(r). Returns `goal`, each row in the lane that has its axis.
 template <int kAtOnce, class AnyTeam>
 CUTPROOF_DEVICE inline Rows<AnyTeam> mean_goal(const AnyTeam& team, const DeviceView& w, const GroupHead& head,
                                                SomeHolders<kAtOnce> some, float h, Float4 base) {
   Rows<AnyTeam> goal;
   const auto add = [&](int begin) {
-    // Several are read at once, along all axes: one by one, each would wait for the one before.
+    // Several are read at once, along all axes: one by one, each would wait for the previous one.
     Rows<AnyTeam> row[kAtOnce];
     for (int k = 0; k < kAtOnce; ++k) {
       team.each(3, [&](int axis) { row[k].of(axis) = w.placement[3 * int64_t{some.to[k].index} + axis]; });

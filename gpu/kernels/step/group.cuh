@@ -1,4 +1,4 @@
-// A group of particles, where they rest, and the ball that contains all of them.
+// A group of particles, its rest position, and a ball that contains it.
 #pragma once
 #include "gpu/kernels/step/affine_map.cuh"
 #include "gpu/kernels/step/contacts.cuh"
@@ -8,7 +8,7 @@
 
 namespace cutproof::gpu::step_detail {
 
-// A group, and what all of its lanes need.
+// A group's data that all of its lanes need.
 struct Group {
   int index;
   GroupHead head;
@@ -26,8 +26,8 @@ CUTPROOF_DEVICE inline Group group_of(const DeviceView& w, int g) {
   return {g, constant(&w.group_head[g]), constant(&w.group_center[g])};
 }
 
-// Where the prediction, the map and the lost shape put a particle of a carried group. What is added to the prediction
-// is small where little has happened, however far the particle is from the base.
+// Where the prediction, the map and the lost shape put a particle of a carried group. The addition to the prediction is
+// small where little has happened, however far the particle is from the base.
 CUTPROOF_DEVICE inline Float3 carried_to(Float3 base, float lost, Float3 predicted, const Map& map, Float3 r) {
   return predicted + (map(r) - lost * (predicted - base));
 }

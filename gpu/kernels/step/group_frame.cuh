@@ -1,5 +1,5 @@
-// The two passes of a frame over the particles of groups. The first one sums what they begin the frame with; the last
-// one stores their displacements and velocities.
+// The two passes of a frame over the particles of groups. The first sums their initial displacements and velocities;
+// the last stores their final ones.
 #pragma once
 #include "gpu/kernels/step/bodies.cuh"
 #include "gpu/kernels/step/contacts.cuh"
@@ -19,7 +19,7 @@
 
 namespace cutproof::gpu::step_detail {
 
-// Sums what a group begins the frame with, and begins its first substep.
+// Sums the initial state of a group, and begins its first substep.
 template <bool kContacts, bool kRetarded, class Block, class AnyTeam>
 CUTPROOF_DEVICE void begin_group(Block& block, const AnyTeam& team, const DeviceView& w, int g) {
   if constexpr (kContacts) {
@@ -29,7 +29,7 @@ CUTPROOF_DEVICE void begin_group(Block& block, const AnyTeam& team, const Device
   const GroupHead& head = group.head;
   const Pace pace = constant(&w.pace[body_of_group(w, head)]);
   if (head.size == 0 || pace.substeps == 0) {
-    // Lanes that read ahead read these before they know that there is nothing to do.
+    // Lanes that read ahead read these before they know that the group has no work.
     if (!team.leads()) return;
     w.group_base[g] = Float4{};
     if constexpr (kContacts) w.group_resolved[g] = kCarried;
@@ -39,7 +39,7 @@ CUTPROOF_DEVICE void begin_group(Block& block, const AnyTeam& team, const Device
   const float per_holder = 1.0f / static_cast<float>(head.holder_count);
   const auto particle = [&](int k) { return w.place_particle[head.begin + k]; };
   const auto mass_share = [&](float mass) { return per_holder * mass; };
-  // The first particle of each lane that this one stands for is kept in registers: nearly always all that it has.
+  // The first particle of each lane that this one stands for stays in registers; most have no other.
   constexpr int kFirst = AnyTeam::kLanes > 1 ? kParticleTeam / AnyTeam::kLanes : 1;
   static_assert(kFirst <= 2);
   Float4 first_place[kFirst], first_velocity[kFirst];
@@ -99,7 +99,7 @@ CUTPROOF_DEVICE void begin_group(Block& block, const AnyTeam& team, const Device
         team, w, group, pace, contacts_of(w, pace, 0), origin, first_parts().place, of_prediction, [&] { return from; },
         to);
     if (!(room > 0) || held_by(w, pace, head.hold_set, 0).active) {
-      team.sync();  // all lanes read what the first one has written
+      team.sync();  // all lanes read the first lane's writes
       begin_tracked<kRetarded>(block, team, w, g, 0, 0, true);
       return;
     }
@@ -146,7 +146,7 @@ CUTPROOF_DEVICE void end_group(const AnyTeam& team, const DeviceView& w, int g) 
     start.row[axis] = now.place;
     end.row[axis] = axis_after<kRetarded>(pace, axis, lost, origin, predicted_parts(pace, before), map, now).place;
   }
-  // Several particles are read at once: behind a store, each would be waited for by itself.
+  // Several particles are read at once: behind a store, each read would be waited for by itself.
   constexpr int kAtOnce = 2;
   CUTPROOF_ROLLED
   for (int begin = team.lane(); begin < head.size; begin += kAtOnce * team.kLanes) {
@@ -161,8 +161,8 @@ CUTPROOF_DEVICE void end_group(const AnyTeam& team, const DeviceView& w, int g) 
     for (int t = 0; t < kAtOnce; ++t) {
       if (begin + t * team.kLanes >= head.size) break;
       const Float3 r = group.offset_at(pace, node[t]), d = brought_to(end, after.place, origin, own[t], r);
-      // The velocity follows from the rounded positions, for between these the particle has moved. A sum of the same
-      // form as d would round otherwise.
+      // The velocity follows from the rounded positions, because the particle has moved between these. A sum of the
+      // same form as d would round otherwise.
       const Float3 v = pace.decay_per_dt * (d - brought_to(start, before.place, origin, own[t], r));
       w.displacement[p[t]] = with_w(d, own[t].displacement.w);
       w.velocity[p[t]] = with_w(v, 0.0f);

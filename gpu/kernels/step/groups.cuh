@@ -1,5 +1,5 @@
-// Groups: particles that the same clusters hold, which the step carries together (docs/design/method.md §13). They are
-// made from the clusters alone, and only those that changed clusters need are made anew.
+// Groups: particles with the same holders, which the step carries together (docs/design/method.md §13). They depend on
+// the clusters alone, and only those of changed clusters are made anew.
 #pragma once
 #include "gpu/kernels/step/make_groups.cuh"
 #include "gpu/kernels/step/measure_groups.cuh"
@@ -8,7 +8,7 @@
 
 namespace cutproof::gpu {
 
-// Makes the groups of the clusters that have changed since the last time. Requires memberships in order.
+// Makes the groups of the clusters that have changed since the last call. Requires memberships in order.
 template <class Launcher>
 void enqueue_groups(Launcher& launcher, const DeviceView& w) {
   launcher.teams(find_changed_clusters_kernel_object{}, kMemberTeam, w.slots_expected, w);
@@ -21,7 +21,7 @@ void enqueue_groups(Launcher& launcher, const DeviceView& w) {
   launcher.clear(&w.counters->groups_stale, 6 * sizeof(int));  // and the five counters behind it
 }
 
-// The same if any cluster has changed, where the host does not know that.
+// The same if any cluster has changed, for callers that do not know it.
 template <class Launcher>
 void enqueue_groups_if_stale(Launcher& launcher, const DeviceView& w) {
   Counters* const c = w.counters;  // an address only: counters lie on the device

@@ -1,5 +1,5 @@
-// The numbers that an iteration has in every substep of a body: the weights of the Chebyshev semi-iteration, and how
-// much of the predicted shape is lost (docs/design/method.md §11, §13).
+// The numbers that an iteration has in every substep of a body: the weights of the Chebyshev semi-iteration, and the
+// lost part of the predicted shape (docs/design/method.md §11, §13).
 #pragma once
 #include "gpu/state/device_view.h"
 
@@ -42,7 +42,7 @@ CUTPROOF_DEVICE inline Combination chebyshev(float kdt2, int order) {
   return {omega * (2.0f / (1.0f + r2)), omega - 1.0f};
 }
 
-// l: how much of the predicted shape of a group is lost after so many iterations.
+// l: the part of a group's predicted shape that is lost after so many iterations.
 CUTPROOF_DEVICE inline float lost_fraction(const Pace& pace, int iterations) {
   if (iterations == 0) return 0.0f;
   if (pace.solver == Solver::implicit) return pace.s;
@@ -59,7 +59,7 @@ struct Iteration {
   float s;
   bool implicit;
   bool combined;  // the first iteration is plain
-  bool keeps;     // stores what the next iteration needs; the last one does not
+  bool keeps;     // stores data of the next iteration, unless this is the last
   Combination combination;
   float lost_before, lost_after;
 };
@@ -75,7 +75,7 @@ CUTPROOF_DEVICE inline Iteration iteration_of(const Pace& pace, int iteration, c
   now.lost_after = numbers.lost_after;
   return now;
 }
-// Computed once a frame, because a root and powers take long.
+// Computed once a frame: a root and powers take long.
 CUTPROOF_DEVICE inline IterationNumbers iteration_numbers(const Pace& pace, float kdt2, int iteration) {
   Combination combination = {};
   if (pace.acceleration == Acceleration::chebyshev && iteration > 0) combination = chebyshev(kdt2, iteration);

@@ -15,8 +15,8 @@ CUTPROOF_DEVICE inline int* resolved_before(const DeviceView& w, int substep, in
   return &w.counters->listed[substep % 2][iteration % 2];
 }
 
-// How many groups were tracked when a substep began, for begin_substep_kernel. Those that are tracked from this substep
-// on are counted apart. There are three such counts: one is read, one counts, and one is cleared.
+// Groups that were tracked when a substep began, for begin_substep_kernel. New ones of this substep are counted apart.
+// There are three counts: one is read, one counts, and one is cleared.
 CUTPROOF_DEVICE inline int tracked_before(const DeviceView& w, int substep) {
   return w.counters->tracked[(substep + 1) % 2] + w.counters->newly_tracked[(substep + 2) % 3];
 }
@@ -25,12 +25,12 @@ CUTPROOF_DEVICE inline int tracked_before(const DeviceView& w, int substep) {
 template <class AnyTeam, class Block>
 CUTPROOF_DEVICE void list_resolved(Block& block, const AnyTeam& team, const DeviceView& w, const Pace& pace, int g,
                                    int substep, int iteration) {
-  // A resolved group has no map, and may never have had one. Lanes that read ahead read it all the same.
+  // A resolved group may never have had a map; lanes that read ahead read it all the same.
   team.sync();  // all lanes have read the last map
   team.each(3, [&](int axis) { w.group_map[3 * int64_t{g} + axis] = Float4{}; });
   if (!team.leads()) return;
   w.group_resolved[g] = kResolved;
-  if (pace.iterations == 0) return;  // nobody reads the list, or empties it
+  if (pace.iterations == 0) return;  // the list is neither read nor emptied
   block.store(&w.resolved_groups[block.atomic_add(resolved_before(w, substep, iteration), 1)], g);
 }
 // Lists a group as tracked. tracked_so_far: tracked_before() of this substep.

@@ -12,7 +12,7 @@
 
 namespace cutproof::gpu::step_detail {
 
-// Displacement and mass of a loose particle at the start of this substep, which is the end of the one before. Sets its
+// Displacement and mass of a loose particle at the start of this substep, the end of the previous one. Sets its
 // velocity.
 template <bool kContacts, bool kRetarded>
 CUTPROOF_DEVICE inline Float4 end_loose(const DeviceView& w, const Pace& pace, int o, int p, int substep, Float3& v) {
@@ -64,7 +64,7 @@ CUTPROOF_DEVICE inline void finish_loose(const DeviceView& w, int o) {
   w.velocity[p] = with_w(v, 0.0f);
 }
 
-// Advances the loose particle at place o by an iteration. kAhead: for how many of its clusters its rest position is
+// Advances the loose particle at place o by an iteration. kAhead: the number of its clusters whose rest positions are
 // read before the wait.
 template <bool kContacts, bool kAccelerated, bool kRetarded, int kAhead, class Block>
 CUTPROOF_DEVICE void advance_loose(Block& block, const DeviceView& w, int o, int substep, int iteration) {
@@ -75,7 +75,7 @@ CUTPROOF_DEVICE void advance_loose(Block& block, const DeviceView& w, int o, int
   const Iteration now = iteration_of(w, body, pace, iteration);
   const Particle particle = particle_at<kContacts, kAccelerated>(w, now, o);
   const Float3 at = xyz(particle.at), from = now.implicit ? xyz(particle.predicted) : at;
-  // The mean of the goals is summed less `from`: sums of small numbers cost no digits of d.
+  // The mean of the goals is summed relative to `from`: sums of small numbers cost no digits of d.
   const int clusters = w.membership_count[p], begin = w.membership_begin[p];
   const Contacts contacts = kContacts ? contacts_of(w, pace, substep) : Contacts{};
   const Coordinates c = coordinates(pace, particle.node);
@@ -91,11 +91,11 @@ CUTPROOF_DEVICE void advance_loose(Block& block, const DeviceView& w, int o, int
   if (clusters > 0) {
     for (int t = 0; t < kAhead; ++t) ahead[t] = holder_at(t);
   }
-  block.wait_for_earlier();  // for the clusters; all else is older
-  Float3 pull = at - from;   // of a particle in no cluster: its own place is its goal
+  block.wait_for_earlier();  // for the clusters; all other data is older
+  Float3 pull = at - from;   // without clusters its own place is the goal
   if (clusters > 0) {
     Float3 sum;
-    // Several are read at once: one by one, each would wait for the one before.
+    // Several are read at once: one by one, each would wait for the previous one.
     constexpr int kAtOnce = 4;
     static_assert(kAhead % kAtOnce == 0);
     const auto add = [&](const Holder* some, int first) {

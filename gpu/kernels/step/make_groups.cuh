@@ -1,10 +1,10 @@
-// Which particles are in which group. A class is all particles with the same list of holders and the same grips. Its
-// first holder deals it out to groups of kMostInGroup particles, in ascending order. If fewer than kLeastInGroup
-// particles are left over, these are loose. A particle without a holder is loose too. Equal lists meet in a hash table
-// with an entry for each member of the first holder.
+// Assigns particles to groups. A class is all particles with the same list of holders and the same grips. Its first
+// holder divides it into groups of kMostInGroup particles, in ascending order. A rest of fewer than kLeastInGroup
+// particles is loose, as are particles without a holder. Equal lists meet in a hash table with an entry for each member
+// of the first holder.
 //
-// So a class has its particles in the same chunks wherever it lies in memory. Which particles are in which class
-// depends on their own body only.
+// So a class has its particles in the same chunks wherever it lies in memory, and classes depend on their own body
+// only.
 #pragma once
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/team.h"
@@ -14,9 +14,9 @@ namespace cutproof::gpu {
 
 // Lanes that go through the members of a cluster.
 inline constexpr int kMemberTeam = 32;
-// Teams that share a cluster: where each finds the classes of its members, and where they count these.
+// Teams that share a cluster to find the classes of its members, and to count them.
 inline constexpr int kShares = 8, kCountShares = 4;
-// Threads that deal out a cluster, and how many of its members have room in their shared memory.
+// Threads that divide a cluster into groups, and most members in their shared memory.
 inline constexpr int kDealThreads = 256;
 inline constexpr int kMostDealt = 2048;
 
@@ -26,16 +26,16 @@ namespace groups_detail {
 enum : int { kInside = -1, kLoose = -2 };
 
 // The table of a cluster has the places of its members in DeviceView::members. An entry has a particle of its class
-// (from 1; 0: none) and the number of particles in the class that are counted so far.
+// (from 1; 0: none) and the number of the class's particles counted so far.
 CUTPROOF_BOTH inline int* table(const DeviceView& w) { return w.label; }
 CUTPROOF_BOTH inline int* class_size(const DeviceView& w) { return w.member_scratch; }
-// Parts of DeviceView::slot_scratch: clusters whose groups are made anew, and clusters whose lists of groups are.
+// Parts of DeviceView::slot_scratch: clusters with new groups, and clusters with new lists of groups.
 CUTPROOF_BOTH inline int* changed(const DeviceView& w) { return w.slot_scratch; }
 CUTPROOF_BOTH inline int* remeasured(const DeviceView& w) { return w.slot_scratch + w.slot_capacity; }
 inline constexpr int kRemeasured = 2;  // in DeviceView::regroup: the cluster is in the list remeasured()
-// At the place of a member: the entry of its class in this table, or -1 if another cluster deals out its class.
+// At the place of a member: the entry of its class in this table, or -1 if another cluster divides its class.
 CUTPROOF_BOTH inline int* entry_of_member(const DeviceView& w) { return w.cluster_loose; }
-// By particle of a class that is dealt out without shared memory: how many particles of the class have smaller numbers.
+// By particle of a class divided without shared memory: how many particles of the class have smaller numbers.
 CUTPROOF_BOTH inline int* rank_of(const DeviceView& w) { return w.place_of; }
 
 // A particle's holders. Gaps of the list (-1) are at its end.
@@ -46,7 +46,7 @@ struct HolderList {
 CUTPROOF_DEVICE inline HolderList holders_of(const DeviceView& w, int p) {
   return {w.memberships + w.membership_begin[p], w.membership_count[p]};
 }
-// Entries that are read at once: one by one, each would wait for the one before.
+// Entries are read at once: one by one, each would wait for the previous one.
 inline constexpr int kAtOnce = 4;
 
 CUTPROOF_DEVICE inline int hold_set(const DeviceView& w, int p) { return w.grip_count > 0 ? w.hold_set[p] : 0; }
@@ -86,7 +86,6 @@ CUTPROOF_DEVICE inline int grouped_of(int particles) {
   return left >= kLeastInGroup ? particles : particles - left;
 }
 
-// Gives particle p the place o.
 CUTPROOF_DEVICE inline void place(const DeviceView& w, int p, int o) {
   w.place_particle[o] = p;
   w.place_node[o] = w.node[p];
@@ -95,7 +94,7 @@ CUTPROOF_DEVICE inline void place(const DeviceView& w, int p, int o) {
 
 }  // namespace groups_detail
 
-// Lists the clusters that have changed, and counts how many of their particles and pairs may need places.
+// Lists the changed clusters, and counts their particles and pairs that may need places.
 template <class Block>
 CUTPROOF_DEVICE void find_changed_clusters_kernel(Block& block, const DeviceView& w) {
   using namespace groups_detail;
@@ -136,13 +135,13 @@ CUTPROOF_DEVICE void find_changed_clusters_kernel(Block& block, const DeviceView
 }
 CUTPROOF_KERNEL(find_changed_clusters_kernel);
 
-// Dissolves the groups and the loose particles of changed clusters. The first holder of a group dissolves it: if one
-// holder of a group has changed, so has the first.
+// Dissolves the groups and loose particles of changed clusters. The first holder of a group dissolves it: if one holder
+// of a group has changed, so has the first.
 template <class Block>
 CUTPROOF_DEVICE void dissolve_groups_kernel(Block& block, const DeviceView& w) {
   using namespace groups_detail;
   Counters& c = *w.counters;
-  // No group stays where there is no room behind those that would.
+  // If new groups do not fit behind the present ones, all are made anew.
   const bool whole = block.load(&c.groups_whole) != 0 ||
                      c.placed + c.placed_last + c.due_particles > w.place_capacity ||
                      c.groups + c.due_particles / kLeastInGroup > w.group_capacity ||
@@ -151,7 +150,6 @@ CUTPROOF_DEVICE void dissolve_groups_kernel(Block& block, const DeviceView& w) {
     c.groups_before = whole ? 0 : c.groups;
     block.store(&c.groups_whole, whole ? 1 : 0);
   }
-  // The tables of changed clusters are cleared.
   const Team<Block, kMemberTeam> team(block);
   const int clusters = whole ? c.slots_used : c.regrouped;
   for (int64_t i = team.first(); i < clusters; i += team.stride()) {
@@ -186,13 +184,13 @@ CUTPROOF_DEVICE void find_classes_kernel(Block& block, const DeviceView& w) {
   Counters& c = *w.counters;
   const bool whole = c.groups_whole != 0;
   if (whole && block.first() == 0) c.groups = c.placed = c.placed_last = c.loose = c.pairs = 0;
-  // known: DeviceView::regroup of s, which may be older.
+  // known: DeviceView::regroup of s, possibly outdated.
   const auto remeasure = [&](int s, int known) {
     if (known >= kRemeasured) return;
     if ((block.atomic_or(&w.regroup[s], kRemeasured) & kRemeasured) != 0) return;
     remeasured(w)[block.atomic_add(&c.remeasured, 1)] = s;
   };
-  // Several teams work on each cluster, because there may be few.
+  // Several teams for each cluster, because there may be few.
   const int64_t jobs = int64_t{kShares} * (whole ? c.slots_used : c.regrouped);
   for (int64_t i = team.first(); i < jobs; i += team.stride()) {
     const int share = static_cast<int>(i % kShares),
@@ -231,8 +229,8 @@ CUTPROOF_DEVICE void find_classes_kernel(Block& block, const DeviceView& w) {
 }
 CUTPROOF_KERNEL(find_classes_kernel);
 
-// Deals out the classes of each cluster to groups, and gives places to their particles. A block works on a cluster. The
-// lists of the cluster are in shared memory, unless it has more than kMostDealt members.
+// Divides the classes of each cluster into groups, and gives places to their particles. A block for each cluster. Its
+// lists are in shared memory, unless the cluster has more than kMostDealt members.
 template <class Block>
 CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
   using namespace groups_detail;
@@ -257,8 +255,8 @@ CUTPROOF_DEVICE void deal_out_groups_kernel(Block& block, const DeviceView& w) {
     const int* const members = w.members + begin;
     const int* const classes = table(w) + begin;
     const bool fits = size <= kMostDealt;
-    // By member: the entry of its class in `classes`, or -1 if another cluster deals it out, and its rank in the class.
-    // By entry: the size of the class.
+    // By member: the entry of its class in `classes`, or -1 if another cluster divides the class, and its rank in the
+    // class. By entry: the size of the class.
     const int* const entries = entry_of_member(w) + begin;
     const auto entry_at = [&](int k) { return fits ? shared[k] : entries[k]; };
     const auto rank_at = [&](int k) -> int& { return fits ? shared[kMostDealt + k] : rank_of(w)[members[k]]; };

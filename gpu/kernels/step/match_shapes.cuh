@@ -21,7 +21,7 @@ namespace cutproof::gpu {
 
 namespace step_detail {
 
-// Lanes that share a cluster. Few clusters have more than 32 groups. In a load of many clusters half of the lanes do
+// Lanes that share a cluster; few clusters have more than 32 groups. In a load of many clusters half of the lanes do
 // the work of all, and sum in the same order.
 inline constexpr int kClusterTeam = 32, kHalfTeam = 16;
 inline constexpr int kMatchThreads = 128;
@@ -32,15 +32,15 @@ struct ClusterSums {
   Floats<12> moments;
   Float3 base;
 };
-// How many clusters at most a team sums before their rotations are computed. Rotations take so long that few threads of
-// a block should not compute them while others wait.
+// Most clusters that a team sums before their rotations are computed. Rotations take too long for few threads of a
+// block to compute them while others wait.
 template <int kLanes>
 inline constexpr int kMostTurns = kLanes == kClusterTeam ? 1 : kMatchThreads / kLanes / 2;
 template <int kLanes>
 inline constexpr std::size_t kMatchShared = kMostTurns<kLanes>*(kMatchThreads / kLanes) * sizeof(ClusterSums);
 
-// What the lanes of a cluster need that no iteration changes. Each lane has the first group of each lane that it stands
-// for, and the first loose particle.
+// Data of a cluster's lanes that no iteration changes: the first group of each lane that this one stands for, and the
+// first loose particle.
 template <class AnyTeam>
 inline constexpr int kGroupsAhead = AnyTeam::kLanes > 1 ? kClusterTeam / AnyTeam::kLanes : 1;
 template <class AnyTeam>
@@ -120,7 +120,7 @@ CUTPROOF_DEVICE void sum_cluster(const AnyTeam& team, const DeviceView& w, int s
   if (team.leads()) found.base = base;
 }
 
-// What else a cluster's place follows from.
+// Further data that decides a cluster's place.
 struct ClusterRest {
   Float4 row[3];  // DeviceView::cluster_rest
   Start<float> start;
@@ -146,7 +146,7 @@ CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const Clus
   const Float4 first = rest.row[0], second = rest.row[1], third = rest.row[2];
   const Float3 rest_moment = xyz(first), moved = {moment[3], moment[7], moment[11]};
   const float spread[9] = {second.x, second.y, second.z, second.y, second.w, third.x, second.z, third.x, third.y};
-  // A = Σ w (x - t)(X - T)ᵀ / h². The rest moment is zero but for the rounding of T.
+  // A = Σ w (x - t)(X - T)ᵀ / h². The rest moment is the rounding of T.
   const Float3 shift = rest.per_mass_and_h * moved;
   Matrix3 a;
   for (int row = 0; row < 3; ++row) {
@@ -154,7 +154,7 @@ CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const Clus
       a(row, k) = spread[3 * row + k] + (moment[4 * row + k] - shift[row] * rest_moment[k]);
     }
   }
-  // One particle has no extent: what is left of A is rounding, and rotate() would make a rotation of it.
+  // One particle has no extent: A is only rounding, and rotate() would make a rotation of it.
   const Matrix3& previous = w.rotation[s];
   const Rotation<float> best = rest.size > 1 ? rotate(a, previous, rest.start) : Rotation<float>{previous, true};
   // The centre makes Σ w (goal) equal Σ w x to the rounding of these two sums: the rounded T must not push the
@@ -173,7 +173,7 @@ CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const Clus
 
 // Places all clusters. On the device the teams of a block sum. In a load of many clusters each team sums several, and
 // neighbouring threads then compute their rotations side by side. In a load of few the first thread of each team
-// computes one, and nobody waits for other teams.
+// computes one, without waiting for other teams.
 template <int kLanes, class Block>
 CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int substep, int iteration) {
   using namespace step_detail;
@@ -191,7 +191,7 @@ CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int 
     constexpr bool apart = kLanes == kClusterTeam;
     ClusterSums* const all = block.template shared<ClusterSums>(kMost * kTeams);
     const int mine = block.thread() / kLanes;
-    const int which = apart ? mine : block.thread();  // of its block: the cluster that this thread may place
+    const int which = apart ? mine : block.thread();  // in its block: the cluster that this thread may place
     int turns = 1;
     while (turns < kMost && turns * kTeams * block.count() < slots) ++turns;
     for (int64_t begin = static_cast<int64_t>(block.index()) * turns * kTeams; begin < slots;

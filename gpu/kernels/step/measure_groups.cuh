@@ -1,5 +1,5 @@
-// The constants of groups and clusters that sums over groups need: rest centres, moments of masses, and the offsets
-// between the two.
+// The constants of groups and clusters for sums over groups: rest centres, moments of masses, and the offsets between
+// the centres.
 #pragma once
 #include "gpu/kernels/step/make_groups.cuh"
 #include "gpu/launch/launcher.h"
@@ -43,11 +43,11 @@ CUTPROOF_DEVICE void measure_groups_kernel(Block& block, const DeviceView& w) {
   using namespace groups_detail;
   using Lanes = Team<Block, kGroupTeam>;
   const Lanes team(block);
-  // The particles of a lane are read once.
+  // A lane reads its particles once.
   constexpr int kEach = kMostInGroup / Lanes::kLanes;
   struct Own {
     Coordinates node;
-    float mass;  // what each holder gets of it
+    float mass;  // the share of each holder
   };
   for (int64_t i = w.counters->groups_before + team.first(); i < w.counters->groups; i += team.stride()) {
     const int g = static_cast<int>(i);
@@ -68,7 +68,7 @@ CUTPROOF_DEVICE void measure_groups_kernel(Block& block, const DeviceView& w) {
     });
     const Coordinates base = coordinates(body, w.place_node[head.begin]);
     RestCenter center = {base.i, base.j, base.k, 0, 0, 0};
-    // The second round takes out the error of the first centre.
+    // The second round removes the error of the first centre.
     for (int round = 0; round < 2; ++round) {
       typename Lanes::template Sums<4> sums;
       each([&](int k, const Own& of) {
@@ -136,11 +136,11 @@ CUTPROOF_DEVICE void measure_clusters_kernel(Block& block, const DeviceView& w) 
     const BodyConstants& body = w.body[w.slot_body[s]];
     const RestCenter center = rest_center(w, s);
     const int* const members = w.members + w.slot_begin[s];
-    // A list of groups has a quarter of the room that the members have, for each group has kLeastInGroup of them.
+    // A list of groups has a quarter of the members' capacity, because a group has at least kLeastInGroup of them.
     const int list_begin = (w.slot_begin[s] + kLeastInGroup - 1) / kLeastInGroup;
     int groups = 0, loose = 0;
     typename Team<Block, kMemberTeam>::template Sums<10> sums;
-    // Several tiles are read at once: each of these steps waits for what the one before has read.
+    // Several tiles are read at once: each step waits for the reads of the previous one.
     constexpr int kReadAtOnce = 6;
     for (int tile = 0; tile < size; tile += kReadAtOnce * team.kLanes) {
       int member[kReadAtOnce], at[kReadAtOnce], node[kReadAtOnce], holder_count[kReadAtOnce], place[kReadAtOnce];

@@ -1,5 +1,5 @@
 // Moments of a group: the sums over its particles of w e and w e rᵀ / h. Here e is the distance from a base, and w is
-// the mass that one holder gets of a particle.
+// the share of a particle's mass that each holder gets.
 #pragma once
 #include "gpu/kernels/step/group.cuh"
 #include "gpu/kernels/step/work.cuh"
@@ -39,9 +39,8 @@ CUTPROOF_DEVICE inline Moments load_moments(const DeviceView& w, int g) {
 }
 
 // Sums the moments of the values of a group's particles; value(k) has a weight in w. The base is the value of the
-// middle particle. If that one is farther than `far` from the mean of the group, the base is the mean instead. (It is
-// not always the mean: moments must vanish where the group moves as a whole.) Gives the base, and in w at least the
-// greatest distance from it.
+// middle particle, or the group's mean if that value is farther than `far` from it. (Not always the mean: moments must
+// vanish where the group moves as a whole.) Returns the base, and in w a bound of the greatest distance from it.
 template <int kOrder, class AnyTeam, class Value>
 CUTPROOF_DEVICE Float4 sum_about(const AnyTeam& team, const DeviceView& w, const Group& group, const Pace& pace,
                                  float per_mass, float far, Value value, typename AnyTeam::template Parted<12>& total) {
@@ -68,8 +67,8 @@ CUTPROOF_DEVICE Float4 sum_about(const AnyTeam& team, const DeviceView& w, const
 }
 
 // The moments of a resolved group, from the positions of its particles. They are summed once all have moved: sums and
-// projections together would need too many registers. own: position and mass of this lane's first particle, which is
-// nearly always its only one. (What was just written would have to be waited for.)
+// projections together would need too many registers. own: position and mass of this lane's first particle, usually its
+// only one. (Reading back what was just written would cost a wait.)
 template <class AnyTeam>
 CUTPROOF_DEVICE void sum_resolved(const AnyTeam& team, const DeviceView& w, const Group& group, const Pace& pace,
                                   Float3 base, Float4 own) {

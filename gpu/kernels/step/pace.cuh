@@ -6,12 +6,12 @@
 
 namespace cutproof::gpu::step_detail {
 
-// e^(-x) for x >= 0, within 2 units in the last place. Its operations give the same bits on every machine, which expf
-// of the libraries does not.
+// e^(-x) for x >= 0, within 2 units in the last place, and with the same bits on every machine, unlike the libraries'
+// expf.
 CUTPROOF_DEVICE inline float decay_by(float x) {
   if (x > 87.0f) return 0.0f;  // e^(-88) is below the least normal number
   const float n = rintf(x * -1.44269504f);
-  // ln 2 in two parts. The first one is so short that n times it is exact.
+  // ln 2 in two parts; the first is so short that n times it is exact.
   const float r = fmaf(n, -1.42860677e-6f, fmaf(n, -0.693145752f, -x));
   float sum = 1.0f / 5040.0f;
   sum = fmaf(sum, r, 1.0f / 720.0f);
@@ -28,7 +28,6 @@ CUTPROOF_DEVICE inline float decay_by(float x) {
 CUTPROOF_DEVICE inline float kdt2_of(const BodyConstants& body, const Pace& pace) {
   return body.stiffness * (pace.dt_fraction * pace.prediction_time) * pace.prediction_time;
 }
-// Stores the numbers of all substeps and iterations of a body in this frame.
 CUTPROOF_DEVICE inline void store_numbers(const DeviceView& w, int body, const Pace& pace) {
   const float kdt2 = kdt2_of(w.body[body], pace);
   const float lost = lost_fraction(pace, pace.iterations), lost_at_last = lost_fraction(pace, pace.last_iterations);
@@ -66,7 +65,7 @@ CUTPROOF_DEVICE inline Pace pace_of(const DeviceView& w, int b) {
   for (int axis = 0; axis < 2; ++axis) pace.nodes[axis] = body.nodes[axis];
   pace.by_row = body.by_row;
   pace.by_layer = body.by_layer;
-  // A geometric blade removes what it sweeps and touches nothing.
+  // A geometric blade removes tissue and touches nothing.
   if (body.has_blade && body.criterion != Criterion::geometric) {
     pace.first_move = body.schedule + int64_t{pace.frame} * body.substeps;
   }

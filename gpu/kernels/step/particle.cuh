@@ -1,5 +1,5 @@
-// A particle that has a position of its own, because it is loose or its group is resolved: grips, contacts and impulse
-// at the start of a substep, and an iteration.
+// A particle with a position of its own, because it is loose or its group is resolved: grips, contacts and impulse at
+// the start of a substep, and an iteration.
 #pragma once
 #include "gpu/kernels/step/bodies.cuh"
 #include "gpu/kernels/step/contacts.cuh"
@@ -26,13 +26,13 @@ CUTPROOF_DEVICE inline Held held_by(const DeviceView& w, const Pace& pace, int s
   return held;
 }
 
-// Moves a particle from its prediction to where contacts, or its grip, let it be. Stores that and the displacement from
-// the prediction. Gives its y. mass_share: the mass that each of its holders gets.
+// Moves a particle from its prediction to where contacts, or its grip, allow it. Stores that position and the
+// displacement from the prediction. Returns its y. mass_share: the mass that each of its holders gets.
 template <bool kRetarded>
 CUTPROOF_DEVICE inline Float3 enter_substep(const DeviceView& w, const Pace& pace, const Contacts& contacts,
                                             const Held& held, const RestPoint& rest, int64_t o, Float4 predicted,
                                             Float3 start, float mass_share) {
-  bool in_turn = false;  // of no interest: there is no earlier point to compare with
+  bool in_turn = false;  // unused: there is no earlier point to compare with
   const Float3 free_x = x_between<kRetarded>(pace, start, xyz(predicted));
   const Float3 x = held.active ? start + held.moved : project(contacts, rest, free_x, predicted.w, start, in_turn);
   const Float3 y = y_ahead_of<kRetarded>(pace, x, free_x, xyz(predicted));
@@ -47,7 +47,7 @@ CUTPROOF_DEVICE inline void end_impulse(const DeviceView& w, int p, const Pace& 
   w.impulse[p] = with_w(pace.decay * xyz(w.impulse[p]) + pace.decay_per_dt * pushed, 0.0f);
 }
 
-// What an iteration needs of a particle.
+// A particle's data in an iteration.
 struct Particle {
   Float4 predicted, at;
   Float4 start;                            // with contacts…
@@ -73,8 +73,8 @@ CUTPROOF_DEVICE inline Particle particle_at(const DeviceView& w, const Iteration
   return found;
 }
 
-// Advances the particle at place o by an iteration, towards `from` + pull. from: its prediction (implicit), or where it
-// is (published). Gives its next y.
+// Advances the particle at place o by an iteration, towards `from` + pull. from: its prediction (implicit) or its
+// position (published). Returns its next y.
 template <bool kContacts, bool kAccelerated, bool kRetarded>
 CUTPROOF_DEVICE inline Float3 advance_particle(const DeviceView& w, const Pace& pace, const Contacts& contacts,
                                                const Iteration& now, int64_t o, const Particle& particle, Float3 from,
@@ -92,14 +92,14 @@ CUTPROOF_DEVICE inline Float3 advance_particle(const DeviceView& w, const Pace& 
     const Float3 start = xyz(particle.start), free_x = x_between<kRetarded>(pace, start, free);
     Float3 push;
     if (side == 0) {
-      next = y;  // a held particle stays where its grip has put it
+      next = y;  // a grip holds its particles in place
       push = x_of<kRetarded>(w, pace, o, y) - free_x;
     } else {
       const RestPoint rest = {pace.h, grid_node(pace, particle.node)};
       const Float3 plain_x = x_between<kRetarded>(pace, start, plain);
       Float3 wanted_x = free_x;
       if constexpr (kAccelerated) {
-        // Where several answers are right, the path decides. So particles that touch take the plain iterate.
+        // Of several fixed points the path decides; touched particles take the plain iterate.
         if (now.combined && path_matters(contacts)) {
           bool touched = false;
           CUTPROOF_ROLLED

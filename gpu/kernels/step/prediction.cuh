@@ -26,15 +26,15 @@ template <bool kRetarded, class Number>
 CUTPROOF_DEVICE inline Number x_between(const Pace& pace, Number start, Number y) {
   return is_retarded<kRetarded>(pace) ? start + pace.dt_fraction * (y - start) : y;
 }
-// The y of a particle that contacts have put at x. Without contacts it would have `free_x` and `free_y`. Where contacts
-// do nothing, y has the bits of `free_y`.
+// The y of a particle that contacts have put at x. Without contacts it would have `free_x` and `free_y`. Without any
+// displacement y has the bits of `free_y`.
 template <bool kRetarded>
 CUTPROOF_DEVICE inline Float3 y_ahead_of(const Pace& pace, Float3 x, Float3 free_x, Float3 free_y) {
   return is_retarded<kRetarded>(pace) ? free_y + (1.0f / pace.dt_fraction) * (x - free_x) : x;
 }
 
-// The x of the particle at place o, which has this y and may have been displaced by contacts. With retardation x is
-// stored: computed from y it would round, and what friction holds would creep.
+// The x of the particle at place o with this y, which contacts may have displaced. With retardation x is stored:
+// computed from y it would round, and particles held by friction would creep.
 template <bool kRetarded>
 CUTPROOF_DEVICE inline Float3 x_of(const DeviceView& w, const Pace& pace, int64_t o, Float3 y) {
   return is_retarded<kRetarded>(pace) ? xyz(w.place[o]) : y;

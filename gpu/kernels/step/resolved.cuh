@@ -1,4 +1,4 @@
-// Iterations of resolved groups, whose particles move by themselves from the first possible contact to the end of the
+// Iterations of resolved groups: their particles move one by one from the first possible contact to the end of the
 // substep.
 #pragma once
 #include "gpu/kernels/step/affine_map.cuh"
@@ -70,7 +70,7 @@ CUTPROOF_DEVICE void advance_resolved(Block& block, const AnyTeam& team, const D
   const int first = team.lane();  // of this lane's particles
   Particle of_first;
   if (first < head.size) of_first = particle_at<kContacts, kAccelerated>(w, now, head.begin + first);
-  block.wait_for_earlier();  // for the clusters; all else is older
+  block.wait_for_earlier();  // for the clusters; all other data is older
   const Map goal = mean_goal(team, w, head, ahead.holders, pace.h, ahead.base).all(team);
   Float4 first_at;
   team.each(head.size, [&](int k) {

@@ -1,5 +1,5 @@
 // Stage step (docs/design/method.md §3, §13): position-based dynamics with shape matching, one DeviceView of bodies.
-// This file has its kernels and launches them; the other files of this folder say what the kernels do.
+// This file has its kernels and launches them; the other files of this folder implement them.
 //
 // The particles of a carried group are at d~ + M(r) - l e. Here d~ is the predicted displacement, e = d~ - base, and
 // r = X - X_g. The number l belongs to body and iteration, the affine map M to the group. A prediction follows from the
@@ -35,8 +35,8 @@
 
 namespace cutproof::gpu {
 
-// Clears what a frame counts, and computes the numbers of its bodies. It is the first kernel of a span that begins with
-// the step.
+// Clears a frame's counts, and computes the numbers of its bodies. The first kernel of a span that begins with the
+// step.
 template <class Block>
 CUTPROOF_DEVICE void begin_frame_kernel(Block& block, const DeviceView& w, Span span) {
   using namespace step_detail;
@@ -91,8 +91,8 @@ struct begin_first_substep_kernel_object {
   }
 };
 
-// Ends the substep before `substep`, which is not the first one, and begins `substep` for the bodies that have it.
-// kRows: lanes that share an untouched group.
+// Ends the previous substep and begins `substep`, not the first one, for the bodies that have it. kRows: lanes that
+// share an untouched group.
 template <bool kContacts, bool kRetarded, int kRows, class Block>
 CUTPROOF_DEVICE void begin_substep_kernel(Block& block, const DeviceView& w, int substep) {
   using namespace step_detail;
@@ -220,7 +220,7 @@ struct advance_kernel_object {
   }
 };
 
-// Stores where a frame has put all particles. kLanes: lanes that share a group; no sum depends on them.
+// Stores the final state of all particles. kLanes: lanes that share a group; no sum depends on them.
 template <bool kContacts, bool kRetarded, int kLanes, class Block>
 CUTPROOF_DEVICE void end_step_kernel(Block& block, const DeviceView& w) {
   using namespace step_detail;
@@ -254,8 +254,8 @@ void enqueue(Launcher& launcher, const DeviceView& w, const Plan& plan, Span spa
   const int64_t teams = w.group_capacity > of_places ? w.group_capacity : of_places;
   launcher.items(begin_frame_kernel_object{}, particles, w, span);
   if (!span.is_whole_frame()) enqueue_groups_if_stale(launcher, w);
-  // In a small load a lane has each row of a group's map. In a large one a thread has all rows: there are groups
-  // enough for all threads.
+  // In a small load a lane has each row of a group's map. In a large load a thread has all rows: there are enough
+  // groups for all threads.
   const auto by_rows = [&](auto start) {
     if (w.particles > kMostByRows) return start(std::integral_constant<int, 1>{});
     start(std::integral_constant<int, kRowTeam>{});

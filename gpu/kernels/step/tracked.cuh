@@ -1,5 +1,5 @@
-// Substeps of tracked groups: those that a contact or a grip has touched in this frame. Each substep begins with the
-// positions of their particles.
+// Substeps of tracked groups, which a contact or a grip has touched in this frame. Each substep begins with their
+// particles' positions.
 #pragma once
 #include "gpu/kernels/step/affine_map.cuh"
 #include "gpu/kernels/step/bodies.cuh"
@@ -18,7 +18,7 @@
 
 namespace cutproof::gpu::step_detail {
 
-// How the substep before has left a tracked group.
+// The state in which the previous substep left a tracked group.
 struct Ending {
   Map map;
   Float3 base;
@@ -66,8 +66,8 @@ CUTPROOF_DEVICE void begin_tracked(Block& block, const AnyTeam& team, const Devi
   const Held held = held_by(w, pace, head.hold_set, substep);
   Float3 base;
   bool resolve = true;
-  // The first particle of this lane, nearly always its only one, is kept in registers. What was just written would
-  // have to be waited for.
+  // This lane's first particle, usually its only one, stays in registers. Reading back what was just written would cost
+  // a wait.
   const int first = team.lane();
   Float4 first_start, first_predicted;
   const auto start_of = [&](int k) { return k == first ? first_start : w.start[head.begin + k]; };
@@ -84,7 +84,7 @@ CUTPROOF_DEVICE void begin_tracked(Block& block, const AnyTeam& team, const Devi
     const float per_holder = 1.0f / static_cast<float>(head.holder_count);
     bool in_front = false, in_back = false;  // of the blade, at the start of the substep
     Float3 start_base;                       // a displacement of one of its particles at the start of the substep
-    float start_reach = 0;                   // of its particles from there at most, squared
+    float start_reach = 0;                   // squared bound of its particles' distances from there
     if (is_retarded<kRetarded>(pace)) {
       start_base = xyz(w.start[head.begin]);
       team.sync();  // all lanes have read it
@@ -117,7 +117,7 @@ CUTPROOF_DEVICE void begin_tracked(Block& block, const AnyTeam& team, const Devi
     in_front = team.any(in_front);
     in_back = team.any(in_back);
     const int side = in_front && in_back ? 0 : in_back ? -1 : 1;
-    // (Nobody asks for the room of a held group.)
+    // (The room of a held group is unused.)
     const Ball ball = ball_around(pace, group, base_and_reach, 1.0f, Map{});
     Ball start_ball = {};
     if constexpr (kRetarded) {

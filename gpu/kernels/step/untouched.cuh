@@ -1,5 +1,5 @@
-// Substeps of groups that nothing has touched in this frame. Such a group has no positions of particles: it goes from
-// substep to substep by an affine map and by the numbers of frame_parts.cuh.
+// Substeps of groups that nothing has touched in this frame. Such a group has no positions of particles: an affine map
+// and the numbers of frame_parts.cuh take it from substep to substep.
 #pragma once
 #include "gpu/kernels/step/affine_map.cuh"
 #include "gpu/kernels/step/bodies.cuh"
@@ -29,18 +29,18 @@ CUTPROOF_DEVICE inline Float4 predicted_row(const Pace& pace, int axis, const Ax
           now.place.z + pace.prediction_time * now.velocity.z,
           now.place.w + (pace.prediction_time * now.velocity.w + pace.fall[axis])};
 }
-// What the particles of a group have in common at the start of the frame.
+// The common part of a group's particles at the start of the frame.
 struct Origin {
-  Float4 place, velocity;  // D and V; w: at least every |u| and every |m|
+  Float4 place, velocity;  // D and V; w: bounds of every |u| and every |m|
   CUTPROOF_DEVICE bool uniform() const { return place.w == 0 && velocity.w == 0; }
-  // The base of the group less T. motion: the part of the motion that is left there.
+  // The base of the group less T. motion: the remaining part of the motion.
   CUTPROOF_DEVICE Float3 from(float motion) const { return uniform() ? Float3{} : xyz(place) + motion * xyz(velocity); }
 };
 CUTPROOF_DEVICE inline Origin origin_of(const DeviceView& w, int g) {
   return {w.group_origin[2 * int64_t{g}], w.group_origin[2 * int64_t{g} + 1]};
 }
 
-// One axis after a substep that ends with the map whose row this is. predicted_part: of the prediction of that substep.
+// One axis after a substep that ends with the map of this row. predicted_part: of the prediction of that substep.
 template <bool kRetarded>
 CUTPROOF_DEVICE inline Axis axis_after(const Pace& pace, int axis, float lost, const Origin& origin,
                                        const Parts& predicted_part, Float4 map, const Axis& now) {
@@ -58,7 +58,7 @@ CUTPROOF_DEVICE inline Axis axis_after(const Pace& pace, int axis, float lost, c
   return next;
 }
 
-// What a particle has at the start of the frame.
+// A particle's own part at the start of the frame.
 struct Own {
   Float4 displacement;   // displacement; w: mass
   Float3 shape, motion;  // u; v
@@ -67,8 +67,8 @@ CUTPROOF_DEVICE inline Own own_of(const DeviceView& w, int p, const Origin& orig
   const Float4 d = w.displacement[p];
   return {d, xyz(d) - xyz(origin.place), xyz(w.velocity[p])};
 }
-// Where a particle of an untouched group is. What its group adds is small where little has happened, wherever the other
-// particles are.
+// The position of a particle of an untouched group. The group's contribution is small where little has happened,
+// wherever the other particles are.
 CUTPROOF_DEVICE inline Float3 brought_to(const Map& map, const Parts& parts, const Origin& origin, const Own& own,
                                          Float3 r) {
   const Float3 turned = map.linear(r);
@@ -76,8 +76,8 @@ CUTPROOF_DEVICE inline Float3 brought_to(const Map& map, const Parts& parts, con
   return xyz(own.displacement) + (parts.motion * own.motion + (map.moved() + (parts.shape * own.shape + turned)));
 }
 
-// Gives the particles of an untouched group positions of their own: the start of the substep and the prediction. Gives
-// the base of the prediction.
+// Gives the particles of an untouched group positions of their own: the start of the substep and the prediction.
+// Returns the base of the prediction.
 template <class AnyTeam>
 CUTPROOF_DEVICE Float3 track_particles(const AnyTeam& team, const DeviceView& w, const Group& group, const Pace& pace,
                                        const Contacts& contacts, bool held, int substep) {
@@ -103,8 +103,8 @@ CUTPROOF_DEVICE Float3 track_particles(const AnyTeam& team, const DeviceView& w,
 }
 
 // Stores the base of an untouched group in this substep, and its room: how far its particles may go from their
-// predictions. Gives the room; if it is not positive, a contact may touch the group. from: gives the map of the start
-// of the substep, with `parts`; it is called only for a blade or retardation. to: the map of the prediction, with
+// predictions. Returns the room; if it is not positive, a contact may touch the group. from: returns the map of the
+// start of the substep, with `parts`; called only for a blade or retardation. to: the map of the prediction, with
 // `of_prediction`.
 template <bool kRetarded, class AnyTeam, class From>
 CUTPROOF_DEVICE float note_room(const AnyTeam& team, const DeviceView& w, const Group& group, const Pace& pace,
@@ -113,7 +113,7 @@ CUTPROOF_DEVICE float note_room(const AnyTeam& team, const DeviceView& w, const 
   const int g = group.index;
   Float4 base = with_w(origin.from(of_prediction.motion) + to.moved(), 0.0f);
   for (Float4& row : to.row) row.w = 0;
-  // At least the length of what is left of u and v in any particle.
+  // A bound of the remaining u and v of any particle.
   const auto reach_of = [&](const Parts& part) {
     return (fabsf(1.0f + part.shape) * origin.place.w + fabsf(part.motion) * origin.velocity.w) *
            (1.0f + kPartForRounding);
@@ -126,8 +126,7 @@ CUTPROOF_DEVICE float note_room(const AnyTeam& team, const DeviceView& w, const 
     start = ball_around(pace, group, with_w(origin.from(parts.motion), reach_of(parts)), 1.0f, from());
     if (contacts.move != nullptr) side = side_of_all(contacts, start);
   }
-  // An iteration adds M(r), and takes away a part l of e. A ball that contains the rest shape too contains every
-  // d~ - l e.
+  // An iteration adds M(r) and removes a part l of e. A ball that also contains the rest shape contains every d~ - l e.
   Ball ball = ball_around(pace, group, with_w(xyz(base), own_reach), 1.0f, to);
   ball.radius = fmaxf(ball.radius, pace.h * group.head.radius);
   const float room = room_of_prediction<kRetarded>(pace, contacts, start, ball, side);
@@ -140,7 +139,7 @@ CUTPROOF_DEVICE float note_room(const AnyTeam& team, const DeviceView& w, const 
   return room;
 }
 
-// Begins a substep of a group that nothing has touched so far. Says whether its particles have to be tracked, because a
+// Begins a substep of a group that nothing has touched so far. Returns whether its particles must be tracked, because a
 // contact may touch its prediction or a grip holds it.
 template <bool kContacts, bool kRetarded, class Block, int kRows>
 CUTPROOF_DEVICE bool begin_untouched(Block& block, const Team<Block, kRows>& team, const DeviceView& w, int g,

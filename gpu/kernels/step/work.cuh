@@ -1,4 +1,4 @@
-// How the kernels of the step deal out their jobs: how many lanes share a job, and which team begins with which job.
+// How the kernels of the step distribute jobs: lanes per job, and each team's first job.
 #pragma once
 #include <cstdint>
 
@@ -6,10 +6,10 @@
 
 namespace cutproof::gpu::step_detail {
 
-// Lanes that share a group: one for each row of its map in a carried group, more where its particles are passed over or
-// it is resolved. In a large load one thread has all rows, and half as many lanes share the particles.
+// Lanes that share a group: one for each row of the map of a carried group; more for passes over its particles or if it
+// is resolved. In a large load one thread has all rows, and half as many lanes share the particles.
 inline constexpr int kRowTeam = 4, kParticleTeam = 16, kResolvedTeam = 32;
-inline constexpr int kMostByRows = 150'000;  // more make a load a large one
+inline constexpr int kMostByRows = 150'000;  // a load with more is large
 
 // Lanes that share a tracked or a resolved group, where kRows lanes share a carried one. (Half a warp leaves half as
 // many idle, and takes longer. With it a frame of a million particles on a floor is an eighth shorter. If only a blade
@@ -28,16 +28,15 @@ CUTPROOF_DEVICE int64_t first_job(const AnyTeam& team, int threads) {
   return first < 0 ? first + teams : first;
 }
 
-// How many threads of the grid are busy with `jobs` jobs of small teams and, behind them, `others` jobs of large teams.
+// Threads of the grid that are busy with `jobs` jobs of small teams and, behind them, `others` jobs of large teams.
 template <class Small, class Large>
 CUTPROOF_DEVICE int busy_threads(const Small&, int jobs, const Large&, int others) {
   return jobs * Small::kLanes +
          (others > 0 ? (others + 1) * Large::kLanes : 0);  // + 1: large teams begin at a whole one
 }
 
-// The lanes of a warp have found jobs, and each team of the warp takes one of them. Gives the job of this team, or -1
-// if none is left for it. found: the lanes, as bits; those whose job is taken are crossed out. job: the one of this
-// lane.
+// The lanes of a warp have found jobs, and each team of the warp takes one. Returns this team's job, or -1 if none is
+// left. found: the lanes, as bits; taken ones are cleared. job: the one of this lane.
 template <class Warp, class AnyTeam>
 CUTPROOF_DEVICE int take_each(const Warp& warp, const AnyTeam& team, unsigned& found, int job) {
   constexpr int kTeams = Warp::kLanes / AnyTeam::kLanes;
