@@ -10,7 +10,7 @@ namespace cutproof::gpu {
 
 inline void check_cuda(cudaError_t status, const char* call, const char* file, int line) {
   if (status == cudaSuccess) return;
-  // Errors that are not sticky would otherwise be blamed on the next launch.
+  // Otherwise the next launch would report errors that are not sticky.
   static_cast<void>(cudaGetLastError());
   throw MachineError(std::string("CUDA failed: ") + cudaGetErrorString(status) + " (" + cudaGetErrorName(status) +
                      ") in " + call + " at " + file + ':' + std::to_string(line));

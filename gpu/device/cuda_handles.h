@@ -1,5 +1,5 @@
-// What CUDA hands out, given back by destructors, also where a constructor fails half-way. Giving back is not checked:
-// it meets only errors that the call before has reported, and a destructor has no way to report one.
+// CUDA resources, freed by destructors, also where a constructor fails. Freeing is not checked: it meets only errors
+// already reported, and a destructor could not report one.
 #pragma once
 #include <cuda_runtime_api.h>
 
@@ -50,7 +50,7 @@ inline bool has_memory_on_demand() {
   CUTPROOF_CUDA(cudaDeviceGetAttribute(&can, cudaDevAttrConcurrentManagedAccess, device));
   return can != 0;
 }
-// Pages are made where the device touches them first, and those of the first `at_once` bytes now. Requires
+// Pages are allocated where the device first touches them; those of the first `at_once` bytes now. Requires
 // has_memory_on_demand().
 inline DeviceMemory make_device_memory_on_demand(std::size_t bytes, std::size_t at_once) {
   void* memory = nullptr;
@@ -68,8 +68,8 @@ inline DeviceMemory make_device_memory_on_demand(std::size_t bytes, std::size_t 
 #endif
   return held;
 }
-// What cudaMemcpy and cudaMemset have begun is done. A copy from memory that is not pinned may return while the last of
-// it is under way, and our streams do not wait for the default one: a kernel would read what was there before.
+// Completes cudaMemcpy and cudaMemset. A copy from unpinned memory may return before it ends, and our streams do not
+// wait for the default one: a kernel would read old data.
 inline void wait_for_copies() { CUTPROOF_CUDA(cudaStreamSynchronize(nullptr)); }
 inline PinnedMemory make_pinned_memory(std::size_t bytes) {
   void* memory = nullptr;

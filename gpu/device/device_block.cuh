@@ -1,6 +1,6 @@
-// The Block of kernels on the device (block.h): everything is inlined to what a plain CUDA kernel would say, and what
-// a kernel does not use costs nothing. Block sizes are multiples of 32 (launcher.h checks). Collectives take a number
-// of threads known at run time and combine in a fixed order, so equal block sizes give equal bits.
+// The Block of kernels on the device (block.h). Everything is inlined as in a plain CUDA kernel, and unused parts cost
+// nothing. Block sizes are multiples of 32 (launcher.h checks). Collectives take a number of threads known at run time
+// and combine in a fixed order, so equal block sizes give equal bits.
 #pragma once
 #include <cstdint>
 #include <cstring>
@@ -50,7 +50,7 @@ class DeviceBlock {
     }
     __shared__ int partial[32];
     const int warp = thread() / 32;
-    sync();  // everyone is done with the last use of `partial`
+    sync();  // the last use of `partial` is over
     if (lane() == 31) partial[warp] = through;
     sync();
     const int warps = size() / 32;
@@ -124,7 +124,7 @@ class DeviceBlock {
   __device__ void fence() { __threadfence(); }
   __device__ void wait_for_earlier() {
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
-    // In this order: whoever begins then finds the work of all launches before this one done.
+    // In this order, so that the next launch finds the work of all earlier launches done.
     asm volatile("griddepcontrol.wait;" ::: "memory");
     asm volatile("griddepcontrol.launch_dependents;" ::: "memory");
 #endif
@@ -148,7 +148,7 @@ class DeviceBlock {
 
   template <class T, class Combine>
   __device__ T reduce(T value, Combine combine) const {
-    static_assert(std::is_integral_v<T>);  // so every lane finds the same, in whatever order it combines
+    static_assert(std::is_integral_v<T>);  // so every lane finds the same in any order
 #pragma unroll
     for (int distance = 16; distance > 0; distance /= 2) {
       value = combine(value, by_words(value, [=](unsigned word) { return __shfl_xor_sync(kWarp, word, distance); }));
@@ -157,10 +157,10 @@ class DeviceBlock {
     if (warps == 1) return value;
     __shared__ T partial[32];
     const int lane = static_cast<int>(threadIdx.x & 31u);
-    sync();  // everyone is done with the last use of `partial`
+    sync();  // the last use of `partial` is over
     if (lane == 0) partial[thread() / 32] = value;
     sync();
-    // Every warp adds up the partial results of all; the tree leaves out what is beyond the last warp.
+    // Every warp adds up all partial results; the tree leaves out those beyond the last warp.
     value = partial[lane < warps ? lane : 0];
 #pragma unroll
     for (int distance = 16; distance > 0; distance /= 2) {

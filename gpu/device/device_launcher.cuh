@@ -1,9 +1,9 @@
-// gpu/device: CUDA. The Block of kernels (device_block.cuh), calls that are checked (cuda_check.h) and handles that are
-// given back (cuda_handles.h).
+// gpu/device: CUDA. The Block of kernels (device_block.cuh), checked calls (cuda_check.h), and handles that free
+// resources (cuda_handles.h).
 //
-// This file: the Launcher of launcher.h for the device. capture() writes work down as a CUDA graph, conditions and
-// loops included, which then runs any number of times without the host; a DeviceLauncher made from a stream starts work
-// at once instead, and waits for the device where a condition must be known (for tests and loading).
+// This file: the Launcher of launcher.h for the device. capture() records work as a CUDA graph, conditions and loops
+// included, which then runs any number of times without the host. A DeviceLauncher made from a stream starts work at
+// once and waits for the device at each condition (for tests and loading).
 #pragma once
 #include <cuda_runtime.h>
 #include <thrust/iterator/counting_iterator.h>
@@ -32,8 +32,8 @@ namespace cutproof::gpu {
 
 namespace detail {
 
-// The arguments of a launch as one parameter. (Not std::tuple, whose members device code may not touch, and not a pack
-// of parameters, whose kernel has no address that GCC could find.)
+// A launch's arguments as one parameter. (Device code may not touch members of std::tuple, and GCC finds no address of
+// a kernel with a pack of parameters.)
 template <class... Args>
 struct Arguments {
   template <class Call, class... Before>
@@ -58,7 +58,7 @@ Arguments<First, Rest...> bundle(const First& first, const Rest&... rest) {
 
 }  // namespace detail
 
-// Arguments stay in constant memory: nothing is copied to the stack for kernels that take addresses of them.
+// Arguments stay in constant memory: kernels that take their addresses copy nothing to the stack.
 template <class Kernel, class Arguments>
 __global__ void __launch_bounds__(max_threads<Kernel>(), min_blocks<Kernel>())
     run_kernel(const __grid_constant__ Arguments arguments) {
@@ -66,7 +66,7 @@ __global__ void __launch_bounds__(max_threads<Kernel>(), min_blocks<Kernel>())
     DeviceBlock block;
     if constexpr (!reads_ahead<Kernel>()) block.wait_for_earlier();
     Kernel{}(block, args...);
-    if constexpr (reads_ahead<Kernel>()) block.wait_for_earlier();  // on every way through it
+    if constexpr (reads_ahead<Kernel>()) block.wait_for_earlier();  // on every path
   });
 }
 
@@ -78,12 +78,12 @@ __global__ void set_condition_kernel(cudaGraphConditionalHandle handle, const in
   cudaGraphSetConditional(handle, *flag != 0 ? 1u : 0u);
 }
 
-// What is few is scanned and selected by one block, tile by tile, because CUB takes two launches for either, neither of
-// which may overlap with what is before it. (Beyond some ten thousand CUB is faster.)
+// One block scans and selects short arrays, tile by tile. CUB takes two launches for either, neither of which may
+// overlap with earlier work. (Beyond some ten thousand elements CUB is faster.)
 inline constexpr int kScanThreads = 1024;
 inline constexpr std::int64_t kMostScannedInBlock = 4 * 4 * kScanThreads, kMostSelectedInBlock = 2 * 16 * kScanThreads;
 
-// Neighbouring items of a thread, read as one; those from `count` on are 0.
+// A thread's neighbouring items, read as one; those from `count` on are 0.
 template <class T>
 struct alignas(16) TileItems {
   static constexpr int kEach = 16 / sizeof(T);
@@ -98,7 +98,8 @@ __device__ TileItems<T> load_items(const T* in, int begin, int count) {
   for (int k = 0; k < kEach; ++k) items.item[k] = begin + k < count ? in[begin + k] : T{};
   return items;
 }
-// Calls place(i, value, before) for each item: what measure(value) adds up to over those before it. Gives the total.
+// Calls place(i, value, before) for each item, where `before` is the sum of measure(value) over earlier items. Returns
+// the total.
 template <class T, class Block, class Measure, class Place>
 __device__ int scan_tiles(Block& block, const T* in, int count, Measure measure, Place place) {
   constexpr int kEach = TileItems<T>::kEach;
@@ -107,7 +108,7 @@ __device__ int scan_tiles(Block& block, const T* in, int count, Measure measure,
   for (int tile = 0; tile < count; tile += kScanThreads * kEach) {
     const TileItems<T> own = next;
     const int begin = tile + block.thread() * kEach;
-    next = load_items(in, begin + kScanThreads * kEach, count);  // on its way while this one is scanned
+    next = load_items(in, begin + kScanThreads * kEach, count);  // read while this one is scanned
     int sum = 0, found = 0;
 #pragma unroll
     for (int k = 0; k < kEach; ++k) sum += measure(own.item[k]);
@@ -122,7 +123,7 @@ __device__ int scan_tiles(Block& block, const T* in, int count, Measure measure,
   return running;
 }
 
-// used: null, or how many of the items are there.
+// used: null, or the number of valid items.
 struct scan_in_block_kernel_object {
   static constexpr const char* kName = "scan_in_block_kernel";
   static constexpr int kMaxThreads = kScanThreads;
@@ -158,7 +159,7 @@ struct clear_kernel_object {
   }
 };
 
-// Keys beyond *count become the greatest number, which sorting puts last.
+// Keys beyond *count become the greatest number, so sorting puts them last.
 template <class = void>
 __global__ void pad_keys_kernel(unsigned long long* keys, const int* count, int capacity) {
   const std::int64_t stride = static_cast<std::int64_t>(gridDim.x) * blockDim.x;
@@ -170,7 +171,7 @@ __global__ void drop_padding_kernel(const unsigned long long* keys, int* count) 
   if (*count > 0 && keys[*count - 1] == ~0ull) --*count;
 }
 
-// Scanning one item more than there are, which counts as 0, leaves the total in the place beyond the last.
+// Scanning one more item, 0, puts the total behind the last place.
 struct ScanInput {
   const int* in;
   int count;
@@ -203,15 +204,16 @@ class ScanOutput {
   std::ptrdiff_t at_ = 0;
 };
 
-// What the launches of a launcher or graph share. They never overlap: a graph is one chain of nodes, and what runs
-// beside a part of it another.
+// Shared by the launches of a launcher or graph, which never overlap: a graph is one chain of nodes, and parallel work
+// has its own.
 struct DeviceResources {
   int multiprocessors = 0;
   std::size_t required = 0;  // most bytes of temporary memory that any launch asked for
   std::size_t allocated = 0;
   DeviceMemory temporary;
-  std::vector<Stream> inner;                             // for capturing bodies of conditions, by depth
-  std::vector<std::shared_ptr<DeviceResources>> beside;  // of what runs beside; and beside a part of the first piece, …
+  std::vector<Stream> inner;  // for capturing bodies of conditions, by depth
+  std::vector<std::shared_ptr<DeviceResources>>
+      beside;  // of parallel work; and parallel to a part of the first piece, …
 
   DeviceResources() {
     int device = 0;
@@ -219,7 +221,7 @@ struct DeviceResources {
     CUTPROOF_CUDA(cudaDeviceGetAttribute(&multiprocessors, cudaDevAttrMultiProcessorCount, device));
   }
 
-  // Frees what was there; nothing may be using it.
+  // Frees the old memory, which must be unused.
   void allocate() {
     for (const auto& other : beside) other->allocate();
     if (required <= allocated) return;
@@ -234,7 +236,7 @@ struct DeviceResources {
   }
 };
 
-// CUDA 13 gave the functions with edge data the plain names.
+// CUDA 13 gave the plain names to the functions with edge data.
 inline void capture_info(cudaStream_t stream, cudaGraph_t* graph, const cudaGraphNode_t** dependencies,
                          const cudaGraphEdgeData** edges, std::size_t* count) {
   cudaStreamCaptureStatus status = cudaStreamCaptureStatusNone;
@@ -245,7 +247,7 @@ inline void capture_info(cudaStream_t stream, cudaGraph_t* graph, const cudaGrap
 #endif
   if (status != cudaStreamCaptureStatusActive) throw MachineError("CUDA failed: a stream stopped being captured.");
 }
-// What the next node that is captured on a stream waits for.
+// The dependencies of a stream's next captured node.
 class Dependencies {
  public:
   static Dependencies of(cudaStream_t stream) {
@@ -259,9 +261,9 @@ class Dependencies {
     if (edges != nullptr) found.edges_.assign(edges, edges + count);
     return found;
   }
-  // Instead of what there is.
+  // Replaces the present ones.
   void give(cudaStream_t stream) const {
-    auto nodes = nodes_;  // not taken as constant
+    auto nodes = nodes_;  // the parameter is not const
     const cudaGraphEdgeData* const edges = edges_.empty() ? nullptr : edges_.data();
     constexpr unsigned how = cudaStreamSetCaptureDependencies;
 #if CUDART_VERSION >= 13000
@@ -270,7 +272,7 @@ class Dependencies {
     CUTPROOF_CUDA(cudaStreamUpdateCaptureDependencies_v2(stream, nodes.data(), edges, nodes.size(), how));
 #endif
   }
-  // What either waits for; once, whatever both do.
+  // The union of both, without duplicates.
   Dependencies with(const Dependencies& other) const {
     Dependencies both = *this;
     for (std::size_t k = 0; k < other.nodes_.size(); ++k) {
@@ -307,7 +309,7 @@ inline cudaGraphNode_t append_node(cudaStream_t stream, cudaGraphNodeParams* par
 
 }  // namespace detail
 
-// Work written down. Its launches must not overlap: they share temporary memory.
+// Recorded work. Its launches must not overlap: they share temporary memory.
 class DeviceGraph {
  public:
   DeviceGraph() = default;
@@ -329,8 +331,8 @@ class DeviceLauncher {
   explicit DeviceLauncher(cudaStream_t stream)
       : mode_(Mode::at_once), stream_(stream), resources_(std::make_shared<detail::DeviceResources>()) {}
 
-  // What `work`, a callable that takes a DeviceLauncher&, launches, as a graph. `work` is called twice: first only to
-  // learn how much temporary memory it needs. Nothing is executed.
+  // Captures the launches of `work`, a callable that takes a DeviceLauncher&, as a graph. `work` is called twice, first
+  // only to measure its temporary memory. Nothing is executed.
   template <class Work>
   static DeviceGraph capture(Work work) {
     auto resources = std::make_shared<detail::DeviceResources>();
@@ -399,7 +401,7 @@ class DeviceLauncher {
     }
     if (resources_->beside.size() == beside_) resources_->beside.push_back(std::make_shared<detail::DeviceResources>());
     DeviceLauncher other(mode_, stream_, resources_->beside[beside_], depth_);
-    ++beside_;  // what is side by side within the first piece needs another one
+    ++beside_;  // parallel work within the first piece needs another one
     if (mode_ == Mode::measure) {
       first(*this);
       second(other);
@@ -408,8 +410,7 @@ class DeviceLauncher {
       --beside_;
       return;
     }
-    // All on one stream, told anew what it waits for: a second one that were not brought back, because some call fails
-    // in between, would be left in the middle of capturing.
+    // All on one stream with new dependencies. If a call failed in between, a second stream would stay in capture.
     const auto parted = detail::Dependencies::of(stream_);
     first(*this);
     const auto end_of_first = detail::Dependencies::of(stream_);
@@ -424,7 +425,7 @@ class DeviceLauncher {
     after_both(other);
     const auto end = detail::Dependencies::of(stream_);
     after_launch_ = other.after_launch_;
-    if (end_of_chain == end_of_first && !(end == both)) return;  // what follows both waits for all there is
+    if (end_of_chain == end_of_first && !(end == both)) return;  // the next work waits for everything
     end.with(end_of_chain).give(stream_);
     after_launch_ = false;
   }
@@ -488,7 +489,7 @@ class DeviceLauncher {
  private:
   enum class Mode { at_once, measure, capture };
 
-  // For reading 16 bytes at a time.
+  // For reads of 16 bytes.
   static bool is_aligned(const void* at) { return reinterpret_cast<std::uintptr_t>(at) % 16 == 0; }
 
   DeviceLauncher(Mode mode, cudaStream_t stream, std::shared_ptr<detail::DeviceResources> resources, std::size_t depth)
@@ -498,7 +499,7 @@ class DeviceLauncher {
   void launch(std::int64_t wanted, int threads, std::size_t shared_bytes, const Args&... args) {
     const auto arguments = detail::bundle(args...);
     constexpr auto kernel = &run_kernel<Kernel, detail::Arguments<Args...>>;
-    // Beyond this a kernel must ask; what collectives use (up to 6 KB) counts as well.
+    // A kernel must request more; collectives' use (up to 6 KB) counts as well.
     constexpr std::size_t kWithoutAsking = 40 * 1024;
     if (shared_bytes > kWithoutAsking && mode_ != Mode::capture) {
       check_cuda(
@@ -506,8 +507,8 @@ class DeviceLauncher {
           kernel_name<Kernel>(), __FILE__, __LINE__);
     }
     if (mode_ == Mode::measure) return;
-    // As many as run side by side. Capacities are far above what is there, and a block without work still has to come,
-    // read a counter and go: ten waves of them took as long as the work (advance_kernel of 100,000 particles).
+    // As many as run side by side. Capacities are far above need, and a block without work still has to start and read
+    // a counter. Ten waves of them took as long as the work (advance_kernel of 100,000 particles).
     int side_by_side = 0;
     check_cuda(cudaOccupancyMaxActiveBlocksPerMultiprocessorWithFlags(&side_by_side, kernel, threads, shared_bytes,
                                                                       cudaOccupancyDefault),
@@ -519,7 +520,7 @@ class DeviceLauncher {
     config.dynamicSmemBytes = shared_bytes;
     start<kernel>(config, kernel_name<Kernel>(), arguments);
   }
-  // Begins while the last blocks of the launch before it work, where both know to wait (launcher.h).
+  // Begins while the previous launch's last blocks work, if both wait properly (launcher.h).
   template <auto kKernel, class... Arguments>
   void start(cudaLaunchConfig_t config, const char* name, const Arguments&... arguments) {
     cudaLaunchAttribute overlap = {};
@@ -527,7 +528,7 @@ class DeviceLauncher {
     overlap.val.programmaticStreamSerializationAllowed = 1;
     config.stream = stream_;
     config.attrs = &overlap;
-    // Code for devices before 9.0 knows no such waiting, wherever it runs.
+    // Code compiled for devices before 9.0 cannot wait so, wherever it runs.
     static const bool waits = [&] {
       cudaFuncAttributes attributes = {};
       check_cuda(cudaFuncGetAttributes(&attributes, kKernel), name, __FILE__, __LINE__);
@@ -576,7 +577,7 @@ class DeviceLauncher {
     const cudaStream_t stream = resources_->stream(depth_ + 1);
     CUTPROOF_CUDA(cudaStreamBeginCaptureToGraph(stream, parameters.conditional.phGraph_out[0], nullptr, nullptr, 0,
                                                 cudaStreamCaptureModeRelaxed));
-    cudaGraph_t captured = nullptr;  // the node's own graph: not ours to destroy
+    cudaGraph_t captured = nullptr;  // owned by the node, so never destroyed here
     try {
       DeviceLauncher inside(mode_, stream, resources_, depth_ + 1);
       inside.beside_ = beside_;
@@ -600,7 +601,7 @@ class DeviceLauncher {
     check_cuda(call(nullptr, bytes), name, __FILE__, __LINE__);
     return std::max<std::size_t>(bytes, 1);
   }
-  // Makes sure of that much temporary memory; what it held may be lost.
+  // Ensures so much temporary memory; its contents may be lost.
   void require(std::size_t bytes) {
     resources_->required = std::max(resources_->required, bytes);
     if (mode_ == Mode::measure || resources_->required <= resources_->allocated) return;
@@ -610,7 +611,7 @@ class DeviceLauncher {
     CUTPROOF_CUDA(cudaStreamSynchronize(stream_));
     resources_->allocate();
   }
-  // Calls one of CUB's functions with the memory it asks for, behind `reserved` bytes that are the caller's.
+  // Calls one of CUB's functions with its temporary memory, behind `reserved` bytes of the caller.
   template <class Call>
   void with_temporary(const char* name, Call call, std::size_t reserved = 0) {
     after_launch_ = false;
@@ -633,8 +634,8 @@ class DeviceLauncher {
   Mode mode_;
   cudaStream_t stream_;
   std::shared_ptr<detail::DeviceResources> resources_;
-  std::size_t depth_ = 0, beside_ = 0;  // how many conditions, and how many first pieces, this is within
-  bool after_launch_ = false;           // what was handed over last is a kernel that lets the next one begin
+  std::size_t depth_ = 0, beside_ = 0;  // depths of nested conditions and of first pieces
+  bool after_launch_ = false;           // the last launch was a kernel that lets the next one begin
 };
 
 }  // namespace cutproof::gpu

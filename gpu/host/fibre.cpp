@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kStackBytes = 256 * 1024;
 
-// Who switched to whom. Lies on the stack that was left, so it is there until somebody goes on with that one.
+// Who switched to whom. It lies on the stack that was left, so it lives until that stack is resumed.
 struct Switch {
   Fibre* from;
   Fibre* to;
@@ -25,7 +25,7 @@ struct Switch {
 }  // namespace
 
 struct Fibre::Entry {
-  // Where a switch arrives: notes where the fibre that was left goes on, and returns the one that is entered.
+  // The arrival of a switch: notes where the left fibre resumes, and returns the entered one.
   static Fibre* arrive(context::transfer_t transfer) {
     const auto& made = *static_cast<const Switch*>(transfer.data);
     made.from->at_ = transfer.fctx;
@@ -52,7 +52,7 @@ Fibre::Fibre(void (*body)(void*), void* argument) : body_(body), argument_(argum
   void* const mapping = mmap(nullptr, kStackBytes + page, PROT_READ | PROT_WRITE,
                              MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_STACK, -1, 0);
   if (mapping == MAP_FAILED) throw std::bad_alloc();
-  // Stacks grow downwards: running over the end is a segmentation fault, not silent damage.
+  // Stacks grow downwards: an overflow is a segmentation fault, not silent damage.
   if (mprotect(mapping, page, PROT_NONE) != 0) {
     munmap(mapping, kStackBytes + page);
     throw std::bad_alloc();

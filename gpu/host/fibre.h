@@ -1,5 +1,4 @@
-// Stackful fibres (Boost.Context): stacks of their own to execute on, announced to AddressSanitizer and
-// ThreadSanitizer.
+// Stackful fibres (Boost.Context), announced to AddressSanitizer and ThreadSanitizer.
 #pragma once
 #include <cstddef>
 
@@ -7,18 +6,18 @@ namespace cutproof::gpu {
 
 class Fibre {
  public:
-  // What the calling operating-system thread executes on. announce_thread() says which one that is.
+  // The stack of the calling operating-system thread. announce_thread() says which thread that is.
   Fibre() = default;
-  // A stack of 256 KiB of address space, of which only touched pages take memory. The first time that it is switched to
-  // it calls body(argument), which must not return. Throws std::bad_alloc.
+  // A stack of 256 KiB of address space, of which only touched pages take memory. The first switch to it calls
+  // body(argument), which must not return. Throws std::bad_alloc.
   Fibre(void (*body)(void* argument), void* argument);
   ~Fibre();
   Fibre(const Fibre&) = delete;
   Fibre& operator=(const Fibre&) = delete;
 
-  // Of the fibre made without a body, each time another thread may be on it.
+  // For the fibre made without a body, each time that another thread may be on it.
   void announce_thread();
-  // Goes on with `to`, and returns when somebody goes on with this one, on which the caller must be.
+  // Resumes `to`; returns when another fibre resumes this one, on which the caller must be.
   void switch_to(Fibre& to);
 
  private:
@@ -26,7 +25,7 @@ class Fibre {
 
   void (*body_)(void*) = nullptr;
   void* argument_ = nullptr;
-  void* at_ = nullptr;  // where it goes on
+  void* at_ = nullptr;  // where it resumes
   void* mapping_ = nullptr;
   std::size_t mapped_ = 0;
   const void* bottom_ = nullptr;  // of the stack proper, above the guard page

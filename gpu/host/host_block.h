@@ -1,9 +1,9 @@
 // The Block of kernels on the host (block.h): 32 threads, each a fibre. Every rule of block.h that a kernel breaks is a
-// KernelFault: a barrier or collective that not all threads reach, a warp operation whose mask names a lane that does
-// not come, shared memory beyond what the launch granted or taken in different order.
+// KernelFault. Examples are a barrier or collective that not all threads reach, and a warp operation whose mask names a
+// lane that does not come. Others are shared memory beyond the launch's grant, or taken in different order.
 //
-// Or one thread alone, for speed: then nobody is to be met, so none of these rules can be broken, and a collective
-// gives the thread what it brings. Warp operations are of 32 threads: one thread that asks for them is a KernelFault.
+// Or one thread alone, for speed. It meets no other thread, so it can break none of these rules, and a collective
+// returns the thread's own value. Warp operations need 32 threads: with one thread they are a KernelFault.
 #pragma once
 #include <algorithm>
 #include <atomic>
@@ -160,7 +160,7 @@ class HostBlock {
     worker_.fault(state_, thread_, std::string("runs alone and asks for ") + what + ", which is of 32 threads");
   }
 
-  // The last to arrive does `complete` for everyone.
+  // The last to arrive runs `complete` for all.
   template <class Complete>
   void meet(Operation operation, unsigned mask, const Where& where, Complete complete) {
     if (worker_.arrive(state_, thread_, {operation, mask, where})) {

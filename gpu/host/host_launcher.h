@@ -1,6 +1,6 @@
-// The Launcher of launcher.h that carries out work on the host, at once: when a member returns, its work is done.
-// Kernels are executed by operating-system threads, or simulated under a schedule (thread_schedule.h). Results depend
-// neither on how many those are nor on the threads of a block if the kernels keep the rules of block.h.
+// The Launcher of launcher.h that works on the host, synchronously. Kernels are executed by operating-system threads,
+// or simulated under a schedule (thread_schedule.h). If kernels keep the rules of block.h, results depend neither on
+// the number of those threads nor on the threads of a block.
 #pragma once
 #include <algorithm>
 #include <cstddef>
@@ -48,9 +48,8 @@ class HostLauncher {
 
   template <class Kernel, class... Args>
   void items(Kernel kernel, std::int64_t capacity, Args... args) {
-    // Every thread has at most about 8 items, so that what its neighbours read next is still in the cache; an odd
-    // number of blocks, so that its items do not all fall into the same lines of it.
-    // Who is all alone takes them one after the other.
+    // Every thread has at most about 8 items, so that its neighbours' next reads are still in the cache. An odd number
+    // of blocks keeps its items out of the same cache lines. A thread alone takes them in sequence.
     if (unshared_) return launch(kernel, 1, 1, 0, args...);
     const std::int64_t all = (capacity + kHostThreads - 1) / kHostThreads;
     const std::int64_t most = runtime_->simulated() ? blocks_ : std::max<std::int64_t>(kMostBlocks, all / 8 | 1);
@@ -140,7 +139,7 @@ class HostLauncher {
     std::sort(keys, keys + *count);
     if (*count > 0 && keys[*count - 1] == ~0ull) throw KernelFault("sort_unique: ~0 is not a key.");
     unsigned long long* const end = std::unique(keys, keys + *count);
-    std::fill(end, keys + *count, ~0ull);  // so that nobody relies on what is there
+    std::fill(end, keys + *count, ~0ull);  // so that no kernel relies on the rest
     *count = static_cast<int>(end - keys);
   }
   void clear(void* data, std::size_t bytes) {
@@ -150,13 +149,13 @@ class HostLauncher {
 
   // All choices so far, if SimulationOptions::record was set.
   const ThreadSchedule& recorded() const { return runtime_->recorded(); }
-  // Goes on under another schedule, with nothing recorded. Cheaper than another launcher: stacks are kept. Requires a
-  // launcher that is simulated.
+  // Continues under another schedule, with an empty record. Cheaper than another launcher, because stacks are kept.
+  // Requires a simulated launcher.
   void reschedule(Generator schedule) { runtime_->reschedule(std::move(schedule)); }
   bool simulated() const { return runtime_->simulated(); }
 
  private:
-  // Of two pieces of work that run side by side, lets the other one go on if the schedule says so.
+  // Lets the other of two parallel pieces of work continue if the schedule says so.
   void next_turn() {
     if (turns_ != nullptr) turns_->next();
   }

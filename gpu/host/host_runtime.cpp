@@ -13,7 +13,7 @@
 
 namespace cutproof::gpu {
 
-// Operating-system threads beside the caller's, which wait between launches.
+// The operating-system threads beside the caller's; they wait between launches.
 struct HostRuntime::Pool {
   std::mutex mutex;
   std::condition_variable wake, finished;

@@ -1,11 +1,11 @@
-// gpu/host: how the host executes kernels. The threads of a block are stackful fibres (fibre.h), blocks are spread over
-// operating-system threads (worker.h) or, simulated, interleaved on one under a schedule (thread_schedule.h). Nothing
-// here is seen by kernels; they see HostBlock (host_block.h). Launches are made by HostLauncher (host_launcher.h).
+// gpu/host: executes kernels on the host. The threads of a block are stackful fibres (fibre.h). Blocks are distributed
+// over operating-system threads (worker.h) or, simulated, interleaved on one under a schedule (thread_schedule.h).
+// Kernels see only HostBlock (host_block.h); HostLauncher (host_launcher.h) makes launches.
 //
-// Order of execution, threads: a thread of a block runs until it waits at a barrier or collective, or ends; then the
-// lowest that can run does. A thread that never waits costs no fibre switch. Simulated: every atomic, load and store is
-// a point at which another thread of any live block may go on instead; memory is sequentially consistent, and plain
-// accesses are not such points.
+// Order of execution: a thread of a block runs until it waits at a barrier or collective, or ends; then the lowest
+// runnable one does. A thread that never waits costs no fibre switch. Simulated: at every atomic, load and store
+// another thread of any live block may continue instead. Memory is sequentially consistent, and plain accesses are no
+// such points.
 #pragma once
 #include <memory>
 #include <vector>
@@ -24,12 +24,12 @@ class HostRuntime {
   ~HostRuntime();
 
   bool simulated() const { return simulation_ != nullptr; }
-  // Carries out the launch. Rethrows what a kernel threw; of several failures that of the lowest block.
+  // Executes the launch. Rethrows a kernel's exception, of several that of the lowest block.
   void run(const Job& job);
   const ThreadSchedule& recorded() const { return recorded_; }
-  // A decision between launches: which of `count` goes on, `current` being what went last. Requires simulated().
+  // A decision between launches: which of `count` continues, `current` being the last one. Requires simulated().
   int choose(int count, int current);
-  // Goes on under another schedule, with nothing recorded. Requires simulated().
+  // Continues under another schedule, with an empty record. Requires simulated().
   void reschedule(Generator schedule);
 
  private:

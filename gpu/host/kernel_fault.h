@@ -1,4 +1,4 @@
-// What is said of a kernel that breaks a rule of block.h.
+// Messages about kernels that break a rule of block.h.
 #pragma once
 #include <cstdint>
 #include <stdexcept>
@@ -20,7 +20,7 @@ std::string place_of(const Job& job, const LiveBlock& block);
 std::string list(std::uint32_t threads);
 // "sync (split.cuh:123)"
 std::string describe(const Meeting& meeting);
-// Who waits where when nobody can go on.
+// Which threads wait where in a deadlock.
 std::string describe_stop(const Job& job, const LiveBlock& block);
 
 }  // namespace cutproof::gpu

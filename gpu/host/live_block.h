@@ -9,7 +9,7 @@
 namespace cutproof::gpu {
 
 inline constexpr int kHostThreads = 32;             // threads of a host block: one warp, or one alone (Job::threads)
-inline constexpr std::size_t kMostValueBytes = 16;  // of a value that collectives and shuffles carry
+inline constexpr std::size_t kMostValueBytes = 16;  // of a value in collectives and shuffles
 
 class HostBlock;
 struct Runner;
@@ -23,7 +23,7 @@ struct Where {
   static constexpr Where here(const char* file = __builtin_FILE(), int line = __builtin_LINE()) { return {file, line}; }
 };
 
-// Where a thread waits: threads meet if all three agree.
+// Where a thread waits: threads meet if all three fields agree.
 struct Meeting {
   Operation operation = Operation::sync;
   std::uint32_t mask = 0;
@@ -37,33 +37,33 @@ struct Job {
   const void* call = nullptr;  // the kernel and its arguments
   int blocks = 0;
   int threads = kHostThreads;    // of a block: kHostThreads, or 1, which needs no fibres
-  std::size_t shared_bytes = 0;  // what a block may take
+  std::size_t shared_bytes = 0;  // most that a block may take
 };
 
-// A block that is being executed. Sets of threads are masks of 32 bits.
+// A block in execution. Sets of threads are masks of 32 bits.
 struct LiveBlock {
   static constexpr std::uint32_t kAll = ~0u;
 
   int place = 0;  // among the blocks alive at once
   int index = 0;
   std::uint32_t started = 0, waiting = 0, done = kAll;
-  bool cancelled = false;  // something failed: threads unwind when they are resumed
+  bool cancelled = false;  // after a failure: threads unwind when resumed
   Meeting meeting[kHostThreads];
-  int first_waiting = 0;              // the first of those that are waiting to have come
-  bool agreeing = true;               // all that are waiting wait at the same place as that one
-  Runner* runner[kHostThreads] = {};  // who executes each thread that is under way
+  int first_waiting = 0;              // the first of the waiting threads to arrive
+  bool agreeing = true;               // all waiting threads are at the same place as that one
+  Runner* runner[kHostThreads] = {};  // the runner of each started thread
 
-  // Shared memory: poisoned with 0xff bytes where it is first asked for.
+  // Shared memory, poisoned with 0xff bytes when first requested.
   struct Request {
     std::size_t offset, bytes;
   };
   std::unique_ptr<std::byte[]> shared;
   std::size_t shared_capacity = 0, shared_used = 0;
-  std::vector<Request> requests;             // of the thread that is furthest
+  std::vector<Request> requests;             // of the most advanced thread
   std::size_t requested[kHostThreads] = {};  // how many, by thread
 
-  alignas(16) std::byte value[kHostThreads][kMostValueBytes];   // what each thread brings to a meeting
-  alignas(16) std::byte result[kHostThreads][kMostValueBytes];  // what it takes away
+  alignas(16) std::byte value[kHostThreads][kMostValueBytes];   // each thread's input to a meeting
+  alignas(16) std::byte result[kHostThreads][kMostValueBytes];  // its result
   int source_lane[kHostThreads] = {};                           // of shuffles
 };
 

@@ -24,7 +24,7 @@ struct SplitMix {
   int below(int bound) { return static_cast<int>(operator()() % static_cast<std::uint64_t>(bound)); }
 };
 
-// std::popcount calls a function of libgcc where processors without the instruction are to be served.
+// Without the processor's instruction std::popcount calls a function of libgcc.
 int count_of(std::uint32_t mask) {
   mask -= mask >> 1 & 0x55555555u;
   mask = (mask & 0x33333333u) + (mask >> 2 & 0x33333333u);
@@ -161,7 +161,7 @@ ThreadSchedule shrink(ThreadSchedule schedule, const std::function<bool(const Th
     return s;
   };
   const auto still_fails = [&](const ThreadSchedule& candidate) { return budget-- > 0 && fails(candidate); };
-  // First the end, by bisection: the shortest beginning that still fails is usually much shorter than the whole.
+  // First the end, by bisection: the shortest failing beginning is usually much shorter than the whole.
   for (std::size_t cut = schedule.size() / 2; cut > 0; cut /= 2) {
     while (schedule.size() > cut) {
       ThreadSchedule shorter(schedule.begin(), schedule.end() - static_cast<std::ptrdiff_t>(cut));
@@ -169,8 +169,8 @@ ThreadSchedule shrink(ThreadSchedule schedule, const std::function<bool(const Th
       schedule = std::move(shorter);
     }
   }
-  // Then pieces, halving them (delta debugging, Zeller and Hildebrandt 2002): without the preemptions of a piece,
-  // without its decisions altogether, with the nearest thread instead of a far one.
+  // Then pieces, halved again and again (delta debugging, Zeller and Hildebrandt 2002): without a piece's preemptions,
+  // without its decisions, with the nearest thread instead of a far one.
   using Change = std::function<ThreadSchedule(const ThreadSchedule&, std::size_t begin, std::size_t end)>;
   const Change calm = [](ThreadSchedule s, std::size_t begin, std::size_t end) {
     std::fill(s.begin() + static_cast<std::ptrdiff_t>(begin), s.begin() + static_cast<std::ptrdiff_t>(end), 0);

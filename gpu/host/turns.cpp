@@ -47,7 +47,7 @@ void Turns::await() {
   let(0, lock);
 }
 
-// Comes back when the piece that goes lets this one go on.
+// Returns when the running piece lets this one continue.
 void Turns::let(int piece, std::unique_lock<std::mutex>& lock) {
   const int own = going_;
   going_ = piece;

@@ -1,5 +1,5 @@
-// Two pieces of work that take turns, launch by launch, as somebody chooses: what HostLauncher::side_by_side does under
-// a simulated schedule. Each has an operating-system thread, of which one goes at a time.
+// Two pieces of work that take turns, launch by launch, by a choice: HostLauncher::side_by_side under a simulated
+// schedule. Each has an operating-system thread; one runs at a time.
 #pragma once
 #include <condition_variable>
 #include <exception>
@@ -11,20 +11,19 @@ namespace cutproof::gpu {
 
 class Turns {
  public:
-  // choose(current): which of 0 and 1 goes on, while neither has ended.
+  // choose(current): which of 0 and 1 continues, while neither has ended.
   explicit Turns(std::function<int(int current)> choose) : choose_(std::move(choose)) {}
 
-  // Carries out both, and throws what the first one threw that threw. Throws MachineError if the system refuses a
-  // thread.
+  // Executes both, and rethrows the first exception. Throws MachineError if the system refuses a thread.
   void run(const std::function<void()>& first, const std::function<void()>& second);
-  // By the piece that goes, before each of its launches: lets the other one go on if it is chosen.
+  // Called by the running piece before each of its launches: lets the other one continue if chosen.
   void next();
-  // By the first piece, where the second one may pass await(); by the second one: the first goes on until then.
+  // arrive(): the first piece lets the second pass await(). await(): the second lets the first run until then.
   void arrive();
   void await();
 
  private:
-  struct Abandoned {};  // leads out of a piece when the other one has failed
+  struct Abandoned {};  // ends a piece after the other one has failed
   void carry_out(int piece, const std::function<void()>& work);
   void let(int piece, std::unique_lock<std::mutex>& lock);
 

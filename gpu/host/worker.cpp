@@ -21,7 +21,7 @@ struct Unwind {};
 // A fibre that executes threads of blocks.
 struct Runner {
   Worker* worker = nullptr;
-  LiveBlock* block = nullptr;  // what to execute next
+  LiveBlock* block = nullptr;  // to execute next
   int thread = 0;
   Fibre fibre;
 
@@ -49,7 +49,7 @@ void Worker::switch_to(Runner& to) {
 Runner* Worker::free_runner() {
   if (free_.empty()) {
     runners_.push_back(std::make_unique<Runner>(this));
-    // Here, because a runner gives itself back where nothing may be thrown.
+    // Reserved here, because a runner returns itself where nothing may be thrown.
     free_.reserve(runners_.capacity());
     return runners_.back().get();
   }
@@ -58,7 +58,7 @@ Runner* Worker::free_runner() {
   return runner;
 }
 
-// Takes the next block of the launch into this place; false: there is none.
+// Starts the launch's next block in this place; false: there is none.
 bool Worker::start_block(LiveBlock& block) {
   if (failed_->load(std::memory_order_relaxed) || next_->load(std::memory_order_relaxed) >= job_->blocks) return false;
   const int index = next_->fetch_add(1, std::memory_order_relaxed);
@@ -78,7 +78,7 @@ bool Worker::start_block(LiveBlock& block) {
   return true;
 }
 
-// Executes the launch with up to `live_blocks` blocks at once. Never throws: other workers may be at it.
+// Executes the launch with up to `live_blocks` blocks at once. Never throws: other workers may be busy with it.
 void Worker::go(int live_blocks) {
   error = nullptr;
   error_block = -1;
@@ -94,7 +94,7 @@ void Worker::go(int live_blocks) {
   }
 }
 
-// As go, for blocks of one thread: they run one after the other on the caller's stack.
+// As go, for blocks of one thread: they run in sequence on the caller's stack.
 void Worker::go_alone() {
   error = nullptr;
   error_block = -1;
@@ -161,9 +161,9 @@ void Worker::simulate(const Job& job, SimulationOptions& options, ThreadSchedule
   go(options.live_blocks);
 }
 
-// Who goes on, taken out of the runnable; starts new blocks in the places of those that have ended.
+// The next thread to run, removed from runnable_; new blocks start in the places of ended ones.
 Worker::Next Worker::pick() {
-  if (simulation_ == nullptr && runnable_[0] != 0) {  // as below, for the one block that there is
+  if (simulation_ == nullptr && runnable_[0] != 0) {  // as below, for the only block
     const int thread = std::countr_zero(runnable_[0]);
     runnable_[0] &= runnable_[0] - 1;
     return {blocks_.front().get(), thread};
@@ -190,7 +190,8 @@ Worker::Next Worker::pick() {
   return {blocks_[chosen / 32].get(), chosen % 32};
 }
 
-// Goes on with `next`: on a free stack if it has not started, otherwise on its own. Returns when the caller is resumed.
+// Continues with `next`: on a free stack if it has not started, otherwise on its own. Returns when the caller is
+// resumed.
 void Worker::enter(Next next) {
   LiveBlock& block = *next.block;
   Runner* to = block.runner[next.thread];
@@ -202,7 +203,7 @@ void Worker::enter(Next next) {
   switch_to(*to);
 }
 
-// What a runner does all its life: execute threads, one after the other.
+// A runner's loop: executes threads, one after the other.
 void Worker::loop(Runner& self) {
   for (;;) {
     LiveBlock& block = *self.block;
@@ -222,9 +223,9 @@ void Worker::loop(Runner& self) {
     try {
       check_progress(block);
       next = pick();
-    } catch (...) {  // no memory for a fault's text or for a choice; nothing is above this frame to catch it
+    } catch (...) {  // no memory for a fault's text or for a choice; no frame above catches it
       fail(block, std::current_exception());
-      next = pick();  // asks nobody now
+      next = pick();  // consults no schedule now
     }
     if (next.block == nullptr) {
       free_.push_back(&self);
@@ -239,7 +240,7 @@ void Worker::loop(Runner& self) {
   }
 }
 
-// Called when a thread has stopped for good or waits: if nobody else of its block can go on, nobody ever will.
+// Called when a thread has ended or waits: if no other thread of its block can run, none ever will.
 void Worker::check_progress(LiveBlock& block) {
   if (runnable_[block.place] != 0 || block.waiting == 0) return;
   fail(block, std::make_exception_ptr(KernelFault(describe_stop(*job_, block))));

@@ -1,5 +1,5 @@
-// One operating-system thread that executes blocks of a launch: their barriers and collectives, their shared memory,
-// and who of their threads goes on, in order or as a simulated schedule says.
+// One operating-system thread that executes blocks of a launch: barriers, collectives, shared memory, and the order of
+// threads, fixed or by a simulated schedule.
 #pragma once
 #include <atomic>
 #include <cstddef>
@@ -30,13 +30,13 @@ class Worker {
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  // Carries out blocks of `job`, taking them from `next`, until there are none left or `failed` is set. Sets `failed`
-  // and keeps the exception if a thread throws or a rule is broken; never throws.
+  // Executes blocks of `job`, taken from `next`, until none are left or `failed` is set. Sets `failed` and keeps the
+  // exception if a thread throws or breaks a rule; never throws.
   void run(const Job& job, std::atomic<int>& next, std::atomic<bool>& failed, bool alone);
   // As run, but simulated; all blocks from 0 on.
   void simulate(const Job& job, SimulationOptions& options, ThreadSchedule& recorded);
 
-  // What failed in the last run, and in which block; null: nothing.
+  // The failure of the last run, and its block; null: none.
   std::exception_ptr error;
   int error_block = -1;
 
@@ -47,7 +47,7 @@ class Worker {
   void before_access(LiveBlock& block, int thread) {
     if (simulation_ != nullptr) yield(block, thread);
   }
-  // Whether `thread` is the last to arrive: then it fills in the results and calls release; otherwise it calls wait.
+  // Whether `thread` is the last to arrive; it then writes the results and calls release. Other threads call wait.
   bool arrive(LiveBlock& block, int thread, const Meeting& meeting);
   void release(LiveBlock& block, int thread);
   void wait(LiveBlock& block);
@@ -74,7 +74,7 @@ class Worker {
   Runner* free_runner();
 
   std::vector<std::unique_ptr<LiveBlock>> blocks_;
-  std::vector<std::uint32_t> runnable_;  // by place: threads that are not started or can go on
+  std::vector<std::uint32_t> runnable_;  // by place: threads that are not started or can continue
   std::vector<std::unique_ptr<Runner>> runners_;
   std::vector<Runner*> free_;
   std::unique_ptr<Runner> main_;  // the operating-system thread that called run

@@ -1,11 +1,10 @@
-// gpu/launch: what kernels and those who run them have in common: the contracts of a Block (block.h), of a Team
-// (team.h) and, in this file, of a Launcher, which starts kernels. frame.h hands it the work of a frame; DeviceLauncher
-// (device_launcher.cuh) captures that into a CUDA graph or starts its kernels one by one, HostLauncher
-// (host_launcher.h) carries it out on the spot.
+// gpu/launch: the contracts between kernels and backends: a Block (block.h), a Team (team.h) and, in this file, a
+// Launcher, which starts kernels. frame.h gives it the work of a frame. DeviceLauncher (device_launcher.cuh) captures
+// that into a CUDA graph or starts its kernels one by one; HostLauncher (host_launcher.h) executes it at once.
 //
 // Members of a Launcher:
 //   template <class Kernel, class... Args>
-//   void items(Kernel, int64_t capacity, Args...);             grid-stride kernels: as many threads as is sensible for
+//   void items(Kernel, int64_t capacity, Args...);             grid-stride kernels: a sensible number of threads for
 //                                                              up to `capacity` items; no shared memory
 //   template <class Kernel, class... Args>
 //   void teams(Kernel, int lanes, int64_t capacity, Args...);  items, for up to `capacity` jobs of a Team each (team.h)
@@ -14,38 +13,36 @@
 //                                                              block-stride over up to `capacity` jobs, one block each;
 //                                                              `threads` is for the device (host: 32 or 1), a multiple
 //                                                              of 32 up to kMaxThreads of the kernel
-//   void if_nonzero(const int* flag, Body);                    what `Body` (a callable that launches) does happens only
-//                                                              if *flag is not 0 when the work before it is done
-//   void while_nonzero(int* flag, Body);                       again and again while *flag is not 0
+//   void if_nonzero(const int* flag, Body);                    executes the launches of `Body`, a callable, only if
+//                                                              *flag is not 0 after all earlier work
+//   void while_nonzero(int* flag, Body);                       repeats them while *flag is not 0
 //   template <class First, class Second, class AfterFirst = NoWork, class AfterBoth = NoWork>
 //   void side_by_side(First, Second, AfterFirst = {}, AfterBoth = {});
-//                                                              each launches in its order, the two one beside the
-//                                                              other, and behind them two more, each as soon as what
-//                                                              its name says is done: none touches what another writes
-//                                                              that it does not wait for
-//   bool overlaps() const;                                     whether it makes a difference that they are side by side
+//                                                              runs First and Second in parallel, then AfterFirst and
+//                                                              AfterBoth, each as soon as its name says. None touches
+//                                                              data of another that it does not wait for
+//   bool overlaps() const;                                     whether being side by side makes a difference
 //   void exclusive_scan(const int* in, int* out, int64_t count, int* total, const int* used = nullptr);
 //                                                              out[i] = Σ in[0..i), *total = Σ all; in == out is
 //                                                              allowed
 //   void select(const unsigned char* flags, int64_t count, int* selected, int* selected_count,
 //               const int* used = nullptr);                    indices with a flag, ascending
-//                                                              `used`: that only the first *used <= count items are
-//                                                              there is known when the work before it is done
+//                                                              only the first *used <= count items are valid; *used
+//                                                              is known after all earlier work
 //   void sort_unique(unsigned long long* keys, int* count, int64_t capacity);  ascending, duplicates gone, in place;
-//                                                              *count <= capacity valid keys before and after; what
-//                                                              lies beyond them is overwritten; ~0 is not a key
+//                                                              *count <= capacity valid keys before and after; the rest
+//                                                              is overwritten; ~0 is not a key
 //   void clear(void* data, std::size_t bytes);                 zero bytes, of whole ints
 // `Body`, `First` and the others take the Launcher to use inside as their argument. Even with a capacity of 0 one block
-// runs: a kernel may have something to do once.
+// runs, because a kernel may have work to do once.
 //
-// A kernel is handed over as an object, because a function template cannot be: CUTPROOF_KERNEL(verb_noun_kernel)
+// A kernel is passed as an object, because a function template cannot be: CUTPROOF_KERNEL(verb_noun_kernel)
 // defines the type verb_noun_kernel_object, whose operator() calls it. CUTPROOF_KERNEL_THREADS(verb_noun_kernel, n)
 // allows blocks of up to n threads on the device instead of 256 (the compiler then has 65536 / n registers a thread).
 //
-// A launch may begin while the last blocks of the one before it work, and then waits for them: what it takes to start
-// is hidden. A kernel whose object has kReadsAhead = true is not made to wait. It calls wait_for_earlier() itself, and
-// may read before that what the launch before it does not write. (What is older is there: a launch begins only when
-// the one before it no longer waits for others.)
+// A launch may begin while the last blocks of the previous one work, and then waits for them: this hides its start. A
+// kernel whose object has kReadsAhead = true calls wait_for_earlier() itself. Before that it may read data that the
+// previous launch does not write. (Older data is complete: a launch begins only when the previous one no longer waits.)
 #pragma once
 #include <stdexcept>
 #include <string>
@@ -89,8 +86,8 @@ constexpr int max_threads() {
   }
 }
 
-// How many of its largest blocks a multiprocessor is to hold: the compiler keeps the registers of a thread below what
-// that leaves. 0: as many as come.
+// How many of its largest blocks a multiprocessor should hold; the compiler limits a thread's registers accordingly. 0:
+// no limit.
 template <class Kernel>
 constexpr int min_blocks() {
   if constexpr (requires { Kernel::kMinBlocks; }) {

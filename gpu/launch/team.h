@@ -1,8 +1,8 @@
-// Several neighbouring lanes of a warp that do one small job together: a group of particles, a cluster of groups. A
-// warp holds several teams, which need not do the same at the same time.
+// Neighbouring lanes of a warp that do one small job together: a group of particles, a cluster of groups. A warp has
+// several teams, which need not do the same at the same time.
 //
-// On the host a team is one thread, because meetings of fibres cost more than such a job has work; its sums keep one
-// bank for each lane of the device and combine them in the same order, so both give the same bits.
+// On the host a team is one thread, because meetings of fibres cost more than such a job. Its sums keep one bank for
+// each lane of the device and combine them in the same order, so both give the same bits.
 #pragma once
 #include <cstdint>
 
@@ -28,17 +28,17 @@ class Team {
   CUTPROOF_DEVICE int64_t stride() const { return block_.stride() / kLanes; }
   CUTPROOF_DEVICE int lane() const { return block_.lane() % kLanes; }
   CUTPROOF_DEVICE bool leads() const { return lane() == 0; }
-  // Whether this lane is the one that each() gives item k to.
+  // Whether each() gives item k to this lane.
   CUTPROOF_DEVICE bool has(int k) const { return k % kLanes == lane(); }
 
-  // visit(k) for the items of [0, count) that are this lane's, ascending.
+  // visit(k) for this lane's items of [0, count), ascending.
   template <class Visit>
   CUTPROOF_DEVICE void each(int count, Visit visit) const {
     for (int k = lane(); k < count; k += kLanes) visit(k);
   }
 
-  // use(k, ask(k)) for the same items, several of which are asked for before the first of them is used: one by one,
-  // each would wait for what the one before has asked for. ask() may be called more than once for an item.
+  // use(k, ask(k)) for the same items. Several are asked before the first is used: one by one, each would wait for the
+  // previous one. ask() may be called more than once for an item.
   template <int kAtOnce, class Ask, class Use>
   CUTPROOF_DEVICE void each_asked(int count, Ask ask, Use use) const {
     for (int begin = lane(); begin < count; begin += kAtOnce * kLanes) {
@@ -54,8 +54,8 @@ class Team {
     }
   }
 
-  // visit(i), by the whole team, for those i of [0, count) that are wanted. Each lane asks of one of them, far from
-  // those of its neighbours: what is wanted lies side by side.
+  // visit(i), by the whole team, for the wanted i of [0, count). The lanes ask about items far apart, because wanted
+  // items are adjacent.
   template <class Wanted, class Visit>
   CUTPROOF_DEVICE void each_wanted(int64_t count, Wanted wanted, Visit visit) const {
     for (int64_t begin = first(); begin < count; begin += kLanes * stride()) {
@@ -66,9 +66,8 @@ class Team {
     }
   }
 
-  // N sums over items. Item k adds to of(k), in the order of each(). The order of adding is that of kOrder lanes, of
-  // which each lane here does the work of several if it is not the team's width: so teams of several widths give the
-  // same bits.
+  // N sums over items. Item k adds to of(k), in the order of each(). The order of addition is that of kOrder lanes: if
+  // the team is narrower, each lane does the work of several. So teams of several widths give the same bits.
   template <int N, int kOrder = kWidth>
   class Sums {
    public:
@@ -83,8 +82,7 @@ class Team {
     static constexpr int kBanks = kOrder / kLanes;
     Floats<N> bank_[kBanks] = {};
   };
-  // visit(k, bank, sums) for this lane's items: those of the bank-th lane that it stands for, and the sums that these
-  // add to.
+  // visit(k, bank, sums) for this lane's items: those of the bank-th lane that it stands for, and their sums.
   template <int N, int kOrder, class Visit>
   CUTPROOF_DEVICE void each(Sums<N, kOrder>& sums, int count, Visit visit) const {
     for (int begin = lane(); begin < count; begin += kOrder) {
@@ -104,11 +102,11 @@ class Team {
     return sums.bank_[0];
   }
 
-  // The same sums, by a third of the exchanges, but each of them in one lane only.
+  // The same sums with a third of the exchanges, each in one lane only.
   template <int N>
   class Parted {
    public:
-    // give(n, sum) for the sums that this lane has; give(n, sum, sum of `other`).
+    // give(n, sum) for this lane's sums; give(n, sum, sum of `other`).
     template <class Give>
     CUTPROOF_DEVICE void each(const Team& team, Give give) const {
       each_own(team, [&](int n, int k) { give(n, value_[k]); });
@@ -125,10 +123,10 @@ class Team {
    private:
     friend class Team;
     static constexpr int kMost = 16;
-    static constexpr int kShare = kWidth > kMost ? kWidth / kMost : 1;  // lanes that end up with the same sums…
-    static constexpr int kOwn = kWidth < kMost ? kMost / kWidth : 1;    // … and how many these are
+    static constexpr int kShare = kWidth > kMost ? kWidth / kMost : 1;  // lanes with the same sums at the end…
+    static constexpr int kOwn = kWidth < kMost ? kMost / kWidth : 1;    // … and the number of these sums
     static_assert(N <= kMost);
-    // visit(n, k) for the sums n that this lane has, as value_[k].
+    // visit(n, k) for this lane's sums n, as value_[k].
     template <class Visit>
     CUTPROOF_DEVICE static void each_own(const Team& team, Visit visit) {
       if constexpr (Block::on_device) {
@@ -147,8 +145,8 @@ class Team {
     Parted<N> found;
     if constexpr (Block::on_device) {
       add_banks(sums);
-      // Each lane keeps half of its sums, those of the upper half if `distance` is in its number, and gets what the
-      // lane at that distance has of them.
+      // Each lane keeps half of its sums, the upper half if `distance` is in its number, and adds those of the lane at
+      // that distance.
       constexpr int kMost = Parted<N>::kMost;
       float kept[kMost];
       for (int k = 0; k < kMost; ++k) kept[k] = k < N ? sums.bank_[0].v[k < N ? k : 0] : 0.0f;
@@ -184,17 +182,17 @@ class Team {
     if constexpr (kLanes > 1) return block_.ballot(mask(), value) != 0;
     return value;
   }
-  // What its lanes have written so far is seen by all of them.
+  // All lanes see what its lanes have written so far.
   CUTPROOF_DEVICE void sync() const {
     if constexpr (kLanes > 1) block_.sync_warp(mask());
   }
-  // What the lane that has item k says.
+  // The value of the lane with item k.
   template <class T>
   CUTPROOF_DEVICE T from(int k, T value) const {
     if constexpr (kLanes == 1) return value;
     return block_.shuffle(mask(), value, (block_.lane() & ~(kWidth - 1)) + k % kWidth);
   }
-  // Which lanes have found a job for the whole team, as bits; and the job of the first of them, which is crossed out.
+  // The lanes, as bits, that have found a job for the whole team, and the first one's job, which is then cleared.
   CUTPROOF_DEVICE unsigned found(bool mine) const {
     if constexpr (Block::on_device) return block_.ballot(mask(), mine);
     return mine ? 1u : 0u;
@@ -205,7 +203,7 @@ class Team {
     if constexpr (Block::on_device) return block_.shuffle(mask(), job, ones(first - 1));
     return job;
   }
-  // To every lane; exact for whole numbers only, because lanes of the device and the host's one have different terms.
+  // To every lane; exact for integers only, because the device's lanes and the host's one have different terms.
   CUTPROOF_DEVICE int total(int value) const {
     if constexpr (Block::on_device) {
       for (int distance = kWidth / 2; distance > 0; distance /= 2) value += other(value, distance);
@@ -225,7 +223,7 @@ class Team {
     }
     return 0;
   }
-  // Of the lanes with the same value: the first (from 0), how many are before this one, and how many there are.
+  // Of the lanes with the same value: the first (from 0), the number before this one, and their number.
   struct Equals {
     int first, before, count;
   };
@@ -236,7 +234,7 @@ class Team {
     }
     return {0, 0, 1};
   }
-  // How many lanes before this one say yes, and how many in all.
+  // The number of lanes before this one with a true value, and of all such lanes.
   CUTPROOF_DEVICE int rank(bool value, int& total) const {
     if constexpr (Block::on_device) {
       const unsigned votes = block_.ballot(mask(), value) >> (block_.lane() & ~(kWidth - 1));
@@ -251,7 +249,7 @@ class Team {
   CUTPROOF_DEVICE unsigned mask() const {
     return (kWidth == 32 ? 0xffffffffu : (1u << (kWidth % 32)) - 1u) << (block_.lane() & ~(kWidth - 1));
   }
-  // All of a lane's banks into its first, as the lanes would that they stand for.
+  // Combines a lane's banks into its first, as the lanes would that it stands for.
   template <int N, int kOrder>
   CUTPROOF_DEVICE static void add_banks(Sums<N, kOrder>& sums) {
     for (int half = kOrder / kLanes / 2; half > 0; half /= 2) {

@@ -1,4 +1,4 @@
-// How large the arrays are, and what happens when that was not enough.
+// Sizes of the arrays, and overflows.
 #include <algorithm>
 #include <string>
 
@@ -9,8 +9,8 @@ namespace cutproof::gpu {
 
 namespace {
 
-// How many pairs of cluster and particle expansions may find, some of them several times: the other ends of edges, and
-// at greater depth what lies around these.
+// A bound of the (cluster, particle) pairs that expansion finds, some several times: other ends of edges, and at
+// greater depth the grid nodes around these.
 int64_t additions_bound(const StagingBuffers& staging) {
   int64_t additions = 0;
   for (std::size_t b = 0; b < staging.body.size(); ++b) {
@@ -51,7 +51,7 @@ Extents extents_of(const StagingBuffers& loaded, Capacity capacity) {
     extents.most_substeps = std::max(extents.most_substeps, body.substeps);
     extents.most_iterations = std::max(extents.most_iterations, body.iterations);
   }
-  // There is one set of kernels for bodies with retardation, which is given everything (plan.h).
+  // The one set of kernels for bodies with retardation needs every array (plan.h).
   extents.retarded = some_body(loaded, [](const BodyConstants& b) { return b.retardation > 0; });
   extents.accelerated = some_body(
       loaded, [](const BodyConstants& b) { return b.acceleration != Acceleration::none || b.retardation > 0; });
@@ -61,8 +61,8 @@ Extents extents_of(const StagingBuffers& loaded, Capacity capacity) {
   extents.any_crossing = !loaded.surface_crossing.empty();
   extents.kept_count = narrow(size(loaded.kept_edge), "skin vertices");
   // A cut makes at most one new cluster for each member that it touches: all of a small body at once, a plane's share
-  // of a large one. A merge writes unions behind the present lists, and no round of it needs more than all lists
-  // together; expansion copies what it enlarges.
+  // of a large one. A merge writes unions behind the present lists, and a round needs at most as much as all lists
+  // together. Expansion copies the lists that it enlarges.
   const int64_t additions = std::min(additions_bound(loaded), scaled(1'000'000 + 3 * particles));
   const int64_t cells = std::min(nodes, scaled(4'000'000 + particles)) + 64;
   narrow(15 * cells, "skin cells");
@@ -74,9 +74,9 @@ Extents extents_of(const StagingBuffers& loaded, Capacity capacity) {
   extents.vertex_capacity = narrow(std::min(6 * particles, scaled(4'000'000 + particles)) + 64, "skin vertices");
   extents.cell_capacity = narrow(cells, "skin cells");
   extents.addition_capacity = narrow(additions + 64, "expanded particles");
-  // Particles that change groups get new places, until none are left and all get theirs anew.
+  // Particles that change groups get new places until none are left; then all get theirs anew.
   extents.place_capacity = narrow(particles + particles / 8 + 64, "particles");
-  // A group has at least kLeastInGroup particles, and each of its holders that many members in it.
+  // A group has at least kLeastInGroup particles, all of them members of each holder.
   extents.pair_capacity = extents.member_capacity / kLeastInGroup;
   extents.group_capacity = static_cast<int>(std::min(particles / kLeastInGroup, int64_t{extents.pair_capacity}));
   return extents;
@@ -104,7 +104,7 @@ Extents in_use(const Extents& extents, const Counters& counters) {
 
 bool wants_capacity(const Extents& of, const Counters& c) {
   const auto full = [](int used, int capacity) { return int64_t{4} * used > int64_t{3} * capacity; };
-  // A particle has at most six vertices and a node one cell: a capacity for all of them is enough.
+  // Vertices and cells have capacity for the most that is possible: six per particle, one per node.
   return full(c.slots_used, of.slot_capacity) || full(c.members_used, of.member_capacity) ||
          (of.vertex_capacity < int64_t{6} * of.particles && full(c.vertices_used, of.vertex_capacity)) ||
          (of.cell_capacity < of.nodes && full(c.cells_used, of.cell_capacity));

@@ -1,12 +1,12 @@
-// gpu/state: how a state lies in memory while kernels work on it. One DeviceView for all bodies of a load, arrays one
-// after the other: plain pointers and numbers, passed to kernels by value. arrays.inc lists the arrays, each once;
-// staging.h has them in the host's memory, makes them from states and states from them, and says how large they are.
+// gpu/state: a state in memory while kernels work on it. One DeviceView has all bodies of a load, one after the other.
+// It consists of plain pointers and numbers and is passed to kernels by value. arrays.inc lists each array once.
+// staging.h has the arrays in host memory, converts them from and to states, and determines their sizes.
 //
 // Indices: b body; p particle, over all bodies (body b has [particle_begin[b], particle_begin[b + 1])), in each body in
 // the order of model/; s slot of a cluster, over all bodies; q place in the array of members.
 //
-// Positions are kept as displacements from rest in single precision, x = X + d: what is rounded is then the motion and
-// not the place, so a body of 200 spacings loses no digits to its size (docs/design/tolerances.md).
+// Positions are displacements from rest in single precision, x = X + d. So the motion is rounded, not the place, and a
+// body of 200 spacings loses no digits to its size (docs/design/tolerances.md).
 #pragma once
 #include <cstdint>
 
@@ -15,18 +15,18 @@
 
 namespace cutproof::gpu {
 
-// Why a run had to stop; written with atomic_or into Counters::fault. The stage that would have overflowed has written
+// Reasons to stop a run, combined by atomic_or in Counters::fault. The stage that would have overflowed has written
 // nothing.
 enum : int { kSlotsFull = 1, kMembersFull = 2, kVerticesFull = 4, kCellsFull = 8, kAdditionsFull = 16 };
 
-// Whose memberships may be out of order is known by tiles of so many particles.
+// DeviceView::unsorted has an entry for so many particles.
 inline constexpr int kParticleTile = 32;
 CUTPROOF_BOTH inline int64_t particle_tiles(int64_t particles) {
   return (particles + kParticleTile - 1) / kParticleTile;
 }
 
-// Division by a number that is known before: n / d = n · multiplier >> shift for every 0 <= n < 2^31 (Granlund and
-// Montgomery 1994). A division proper takes some 20 instructions, and kernels need two for each particle they look at.
+// Division by a number known in advance: n / d = n · multiplier >> shift for every 0 <= n < 2^31 (Granlund and
+// Montgomery 1994). A normal division takes some 20 instructions, and kernels need two for each particle.
 struct Divider {
   unsigned multiplier;
   int shift;
@@ -77,7 +77,7 @@ struct WallF {
   float offset, friction;
 };
 
-// model/blade.h BladePose; normal: along × back. Read as whole lines of 16 bytes, once for each particle near a blade.
+// model/blade.h BladePose; normal: along × back. Read in whole lines of 16 bytes, once for each particle near a blade.
 struct alignas(16) PoseF {
   Float3 edge, along, back, normal;
 };
@@ -93,17 +93,17 @@ struct GripF {
   int64_t table;  // first entry in DeviceView::grip_active and DeviceView::grip_displacement
 };
 
-// What the step of a body needs in the frame in progress, in one line of the cache: most of its threads have nothing
-// else to wait for before their own work.
+// A body's numbers for its step in the frame in progress, in one cache line: most threads wait for nothing else before
+// their own work.
 struct alignas(128) Pace {
   int64_t first_move;  // of the blade in this frame, in DeviceView::moves; -1: none, or one that touches nothing
   int substeps, iterations, last_iterations;  // 0: its schedule is over
   int frame;
   float h, per_h;
   float prediction_time;        // dt + τ: from the start of a substep to y (step/prediction.cuh)
-  float dt_fraction;            // dt / (dt + τ): the part of that way after which a particle is at x
+  float dt_fraction;            // dt / (dt + τ): the part of that time after which a particle is at x
   float decay, decay_per_dt;    // decay: e^(-c dt)
-  float held_alpha, held_beta;  // how much held particles are pushed (step/iteration_numbers.cuh)
+  float held_alpha, held_beta;  // coefficients of the push on held particles (step/iteration_numbers.cuh)
   float s;                      // pull towards the goal (docs/design/method.md §3)
   Float3 fall;                  // dt (dt + τ) · gravity
   Solver solver;
@@ -116,23 +116,22 @@ struct alignas(128) Pace {
 };
 static_assert(sizeof(Pace) == 128);
 
-// What is the same in an iteration of all substeps (kernels/step/iteration_numbers.cuh).
+// The numbers that an iteration has in all substeps (kernels/step/iteration_numbers.cuh).
 struct alignas(16) IterationNumbers {
   float pull, carry;              // of the Chebyshev semi-iteration
-  float lost_before, lost_after;  // how much of a prediction's own shape
+  float lost_before, lost_after;  // lost part of a prediction's own shape
 };
 
-// A group: particles that the same clusters hold (docs/design/method.md §13, where groups are made). Its particles have
-// the places [begin, begin + size), ascending; its holders are DeviceView::holders[holder_begin .. holder_begin +
-// holder_count).
+// A group: particles with the same holders (docs/design/method.md §13). Its particles have the places [begin, begin +
+// size), ascending; its holders are DeviceView::holders[holder_begin .. holder_begin + holder_count).
 struct alignas(16) GroupHead {
   int begin, size, body;
-  int middle;  // which of its particles, from 0, is nearest to its rest centre
+  int middle;  // index of its particle nearest to its rest centre
   int holder_begin, holder_count;
-  float radius;  // [h], at least the distance of each particle from the rest centre, at rest
+  float radius;  // [h], bound of the particles' distances from the rest centre, at rest
   int hold_set;  // of its particles
 };
-// A rest centre as kernels keep it: h · (base + offset), base being the grid coordinates of a particle.
+// A rest centre in kernels: h · (base + offset), where base has the grid coordinates of a particle.
 struct alignas(16) RestCenter {
   int i, j, k;
   float x, y, z;
@@ -142,20 +141,20 @@ struct alignas(16) Offset {
   float x, y, z;
   int index;
 };
-// What a cluster is made of: DeviceView::cluster_groups[group_begin .. group_begin + group_count), and
-// DeviceView::cluster_loose[loose_begin .. loose_begin + loose_count). One that is no more is made of nothing.
+// The parts of a cluster: DeviceView::cluster_groups[group_begin .. group_begin + group_count), and
+// DeviceView::cluster_loose[loose_begin .. loose_begin + loose_count). A vanished cluster has none.
 struct alignas(16) ClusterHead {
   int group_begin, group_count, loose_begin, loose_count;
 };
-// Groups are no larger: a team of lanes has the same work with each of them, and no body is one job.
+// Larger groups would give a team uneven work; kMostInGroup also keeps a body from being one job.
 inline constexpr int kMostInGroup = 64;
-// Fewer particles with the same holders are not worth a map; they are loose.
+// Fewer particles with the same holders do not justify a map; they are loose.
 inline constexpr int kLeastInGroup = 4;
 
-// DeviceView::group_resolved: a group's particles are moved by its map, one by one, or by its map and a grip.
+// DeviceView::group_resolved: particles are moved by the map, one by one, or by the map and a grip.
 enum : int { kCarried = 0, kResolved = 1, kHeld = 2 };
 
-// What changes in size or says what happened. One copy for all bodies.
+// Sizes that change, and reports. One copy for all bodies.
 struct Counters {
   int fault;               // see above
   int slots_used;          // slots [0, slots_used) have been given out
@@ -167,14 +166,14 @@ struct Counters {
   int debris;              // …, by this frame's split
   int fallen;              // split: length of DeviceView::fallen, without debris, which follows
   int whole_tissue;        // split: debris may be anywhere in some body, so all of its tissue is labelled
-  int slots_before;        // split: slots that had been given out before it
+  int slots_before;        // split: slots used before it
   int affected;            // clusters that lost a particle in this frame: length of DeviceView::affected
   int merging;             // merge rounds go on while this is not 0
   int round;               // merge round, from 0: the next one
-  int merging_round;       // merge: the round whose proposals are being carried out
+  int merging_round;       // merge: the round whose proposals are carried out
   int live_members;        // merge: members of all clusters
-  int moving;              // merge: slots whose lists are to be moved together, because some union found no places…
-  int moved_members;       // … and what they have in all
+  int moving;              // merge: slots of lists to compact, because some union found no places…
+  int moved_members;       // … and their members in all
   int small;               // length of DeviceView::small_clusters
   int expanding;           // some body of this span needs the expand stage
   int additions;           // length of DeviceView::additions
@@ -182,31 +181,31 @@ struct Counters {
   int skin_changes;        // skin: particles that change the cells around them: length of DeviceView::fallen
   int stage_ran[6];        // by stage: launched in this span
   int changed;             // scratch of a stage's loop
-  int failed;              // split: there are too few slots for it
+  int failed;              // split: too few slots
   int additions_before;    // expand: length of DeviceView::additions before the layer in progress
   int growth;              // expand: members that the enlarged clusters need
   int memberships_before;  // expand: length of DeviceView::memberships in use before it
-  // groups: these six are 0 once they have been made
+  // groups: these six are 0 after groups are made
   int groups_stale;      // clusters have changed since groups were made, or none were made yet
-  int groups_whole;      // none of them is to stay
+  int groups_whole;      // all groups are to be made anew
   int regrouped;         // clusters whose groups are made anew
   int remeasured;        // clusters whose lists of groups are made anew
   int due_particles;     // particles that get a new place…
-  int due_pairs;         // … and in how many clusters they are
-  int groups;            // how many there are; those of size 0 are no more
-  int placed;            // places given out from the first on, to classes…
-  int placed_last;       // … and from the last on, to particles that are in none
-  int loose;             // length of DeviceView::loose_places: particles that are alive and in no group, and gaps
+  int due_pairs;         // … and their pairs of particle and cluster
+  int groups;            // numbers in use; groups of size 0 are gone
+  int placed;            // places used from the first on, by classes…
+  int placed_last;       // … and from the last on, by particles in no class
+  int loose;             // length of DeviceView::loose_places: living particles in no group, and gaps
   int pairs;             // of group and holder: length of DeviceView::holders
-  int groups_before;     // groups: those from here on are new
+  int groups_before;     // groups: the first new one
   int listed[2][2];      // step, by turns of substeps: how many groups are listed in DeviceView::resolved_groups; by
                          // turns of iterations: when this one began, and by now
-  int tracked[2];        // step, by turns of substeps: how many groups are listed in DeviceView::tracked_groups…
-  int newly_tracked[3];  // … and how many came to it in that one
+  int tracked[2];        // step, by turns of substeps: length of DeviceView::tracked_groups…
+  int newly_tracked[3];  // … and groups added in the substep
   int scratch[8];
 };
 
-// What decides how large the arrays are.
+// The numbers that determine the sizes of arrays.
 struct Extents {
   int bodies = 0, particles = 0;
   int64_t nodes = 0;                                   // over all bodies
@@ -215,13 +214,13 @@ struct Extents {
   int64_t grip_substeps = 0;  // substeps of each grip's schedule, over all grips
   int most_substeps = 0;      // of any body
   int most_iterations = 0;    // of any body, in a substep
-  int accelerated = 0;        // some body's iterations are
+  int accelerated = 0;        // some body's iterations are accelerated
   int any_contact = 0;        // some body has a blade, a wall or a grip
-  int retarded = 0;           // some body's elasticity acts ahead of where it is
-  int any_crossing = 0;       // of some body it is known where its surface crosses grid edges
-  int kept_count = 0;         // vertices of the skins that were loaded, on edges that a cut has opened
+  int retarded = 0;           // some body has retardation
+  int any_crossing = 0;       // some body has Body::surface_crossing
+  int kept_count = 0;         // loaded skin vertices on edges that a cut has opened
   int slot_capacity = 0, member_capacity = 0, vertex_capacity = 0, cell_capacity = 0, addition_capacity = 0;
-  int slots_expected = 0;  // how many clusters grids are made for: fewer than there is room for, and not the most
+  int slots_expected = 0;  // clusters that grids are sized for: fewer than the capacity
   int group_capacity = 0, pair_capacity = 0, place_capacity = 0;
 };
 
@@ -231,7 +230,7 @@ struct DeviceView : Extents {
 };
 
 inline constexpr int kDeadBefore = 0x7fffffff;
-// DeviceView::vertex_reach of a vertex that a blade has brought about, until it is placed.
+// DeviceView::vertex_reach of a new cut vertex until it is placed.
 inline constexpr float kReachUnknown = -1;
 
 CUTPROOF_BOTH inline bool alive(const DeviceView& w, int p) { return w.death[p] < 0; }

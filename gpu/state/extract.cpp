@@ -1,4 +1,4 @@
-// From staging buffers, after kernels have worked on them, to states.
+// From staging buffers to states.
 #include <algorithm>
 #include <utility>
 
@@ -12,7 +12,7 @@ namespace {
 
 Vec3 d(Float3 v) { return {v.x, v.y, v.z}; }
 
-// Which slots, skin vertices and cells each body has: they interleave once clusters have split and skins have grown.
+// The slots, skin vertices and cells of each body: bodies interleave once clusters have split and skins have grown.
 // Entries of body b: list[begin[b] .. begin[b + 1]), ascending.
 struct ByBody {
   std::vector<int> list;

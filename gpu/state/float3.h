@@ -1,5 +1,5 @@
-// Vectors and matrices of the kernels, which work in single precision. What a rotation needs is written for double as
-// well: rotations are measured in both (docs/results/accuracy.md, Rotations).
+// Vectors and matrices of kernels, in single precision. Rotations are also measured in double, so their parts are
+// templates (docs/results/accuracy.md, Rotations).
 #pragma once
 #include <cmath>
 #include <cstring>
@@ -53,8 +53,8 @@ struct Matrix3x3 {
 };
 using Matrix3 = Matrix3x3<float>;
 
-// What neither this launch writes nor the one before it, with which it may overlap (launcher.h). The compiler may then
-// keep it, which it must not of other memory, that any store could change.
+// Memory that neither this launch nor the previous, possibly overlapping one (launcher.h) writes. So the compiler may
+// keep its value, unlike other memory, which any store could change.
 template <class T>
 CUTPROOF_DEVICE inline T constant(const T* at) {
   static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % 4 == 0);

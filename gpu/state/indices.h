@@ -1,4 +1,4 @@
-// Between the numbers of model/, 64 bits wide, those of the kernels, 32 bits wide, and those of containers.
+// Converts between numbers of model/ (64 bits), of kernels (32 bits) and of containers.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace cutproof::gpu {
 
-// Throws MachineError if there are more of them than kernels can index. `what`: of what, in the plural.
+// Throws MachineError if the value exceeds what kernels can index. `what`: the counted things, in the plural.
 inline int narrow(int64_t value, const char* what) {
   if (value > std::numeric_limits<int>::max()) {
     throw MachineError(std::string("the kernels index with 32 bits, and this load has too many ") + what + ": " +

@@ -130,7 +130,7 @@ void add_constants(StagingBuffers& staging, const Setup& setup, const State& sta
   staging.body.push_back(body);
 }
 
-// Particles that the same grips name share a set of them.
+// Particles held by the same grips share a hold set.
 void add_hold_sets(StagingBuffers& staging, const Setup& setup) {
   const BodyConstants& body = staging.body.back();
   std::map<int32_t, std::vector<int>> grips_of;
@@ -163,7 +163,7 @@ void add_particles(StagingBuffers& staging, const Setup& setup, const State& sta
     staging.death.push_back(state.alive[at(i)] ? -1 : kDeadBefore);
     staging.displacement.push_back(with_w(f(moved), f(setup.body.mass[at(i)])));
     staging.velocity.push_back(with_w(f(state.v[at(i)]), 0));
-    // The state has one impulse for the body; spread by mass it adds up to the same.
+    // The state has one impulse for the body. Distributed by mass it has the same sum.
     staging.impulse.push_back({});
   }
   double mass = 0;
@@ -190,7 +190,7 @@ void add_particles(StagingBuffers& staging, const Setup& setup, const State& sta
   staging.loaded_skin.push_back(state.skin);
 }
 
-// The first skin is made anew. What it cannot know, where vertices lie that cuts have brought about, is kept.
+// The first skin is made anew. Only the loaded skin knows the places of vertices that cuts have made, so they are kept.
 void add_kept_reaches(StagingBuffers& staging, const Setup& setup, const Skin& skin) {
   const BodyConstants& body = staging.body.back();
   std::vector<std::pair<int, float>> kept;
@@ -231,7 +231,7 @@ void add_clusters(StagingBuffers& staging, const Setup& setup, const State& stat
   }
 }
 
-// Which slots hold each particle, in ascending order.
+// The slots of each particle, ascending.
 void find_memberships(StagingBuffers& staging) {
   const std::size_t n = staging.node.size();
   staging.membership_count.assign(n, 0);

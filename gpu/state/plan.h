@@ -1,5 +1,5 @@
-// What is known of a load before it runs: which stages any of its bodies can need, and the longest loops. Decides
-// which kernels are in the graph at all.
+// What a load can need before it runs: stages of any body, and the longest loops. It decides which kernels the graph
+// has.
 #pragma once
 #include <vector>
 
@@ -11,14 +11,14 @@ namespace cutproof::gpu {
 enum class SplitMethod { global_labels, blocks };  // split.cuh: ECL-CC over all pairs, or one block per cluster
 
 struct Plan {
-  int substeps = 0;                                          // most of any body
-  int iterations = 0;                                        // most of any body
-  bool contacts = false;                                     // some body has a blade, a wall or a grip
-  bool accelerated = false;                                  // some body's iterations are
-  bool retarded = false;                                     // some body has retardation: its kernels can do all
-  bool detection = false;                                    // some body launches detect
+  int substeps = 0;          // most of any body
+  int iterations = 0;        // most of any body
+  bool contacts = false;     // some body has a blade, a wall or a grip
+  bool accelerated = false;  // some body's iterations are accelerated
+  bool retarded = false;     // some body has retardation; its kernels support everything
+  bool detection = false;    // some body launches detect
   bool distance = false, geometric = false, strain = false;  // criteria in use
-  bool nearer = false;  // by distance, of some edge the end nearer to the blade goes
+  bool nearer = false;                                       // by distance, some body removes the nearer ends of edges
   bool debris = false;
   bool merge = false;   // some body merges
   bool expand = false;  // some body may expand

@@ -1,5 +1,5 @@
-// The arrays of a DeviceView in the host's memory: what a load is turned into before it is uploaded, and what a
-// download is turned into states from. The host backend works on them directly.
+// The arrays of a DeviceView in host memory: the form of a load before upload and of a download before extraction. The
+// host backend works on them directly.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -14,13 +14,13 @@
 
 namespace cutproof::gpu {
 
-// How much larger the arrays are than what is in them at load. Factors apply to slots and members; skin and additions
-// are sized from the particles.
+// Sizes of arrays relative to their contents at load. Factors apply to slots and members; skin and additions are sized
+// from the particles.
 struct Capacity {
-  double factor = 1;  // of what a first cut needs at most; doubled each time something has become three quarters full
+  double factor = 1;  // of the most that a first cut needs; doubled whenever an array becomes three quarters full
 };
 
-// What arrays.inc says of an array.
+// The lifetimes of arrays.inc.
 enum class Lifetime { constant, state, derived, scratch };
 template <class Element>
 struct Array {
@@ -31,8 +31,7 @@ struct Array {
 };
 inline constexpr std::nullopt_t none = std::nullopt;
 
-// Elements that nobody has given a value are what the memory holds: making room costs no time, and no memory either
-// where there is much.
+// New elements are left uninitialised, so allocation takes no time, and large arrays take no memory until used.
 template <class Element>
 struct BareAllocator : std::allocator<Element> {
   template <class Other>
@@ -51,7 +50,7 @@ struct StagingBuffers : Extents {
 #define ARRAY(name, Element, extent, lifetime, unset) Elements<Element> name;
 #include "gpu/state/arrays.inc"
 
-  // Skins as loaded: given back until a skin stage has made a body's own.
+  // Skins as loaded, returned until a skin stage has made a body's own.
   std::vector<Skin> loaded_skin;
 
   // Calls visit(array, vector, pointer in `view`) for every array.
@@ -62,50 +61,50 @@ struct StagingBuffers : Extents {
 #include "gpu/state/arrays.inc"
   }
 
-  // Gives every array its extent. What is there stays, and new elements are unset; those beyond an extent are lost.
-  // bare: elements of arrays whose unset is `none` are left as memory comes; else they are zero.
+  // Gives every array its extent. Present elements stay; those beyond an extent are lost. New elements are unset. bare:
+  // elements of arrays whose unset is `none` are uninitialised; else they are zero.
   void allocate(bool bare = false);
 
   // A DeviceView over these vectors.
   DeviceView view();
 };
 
-// load.cpp. Arrays as long as what the load puts into them. Requires setups.size() == states.size(); throws
-// std::invalid_argument if a state does not fit its setup, and MachineError if an index would not fit into 32 bits.
+// load.cpp. Arrays as long as a load's contents. Requires setups.size() == states.size(). Throws std::invalid_argument
+// if a state does not fit its setup, and MachineError if an index would not fit into 32 bits.
 StagingBuffers make_contents(const std::vector<Setup>& setups, const std::vector<State>& states, Capacity capacity);
 // The same with all arrays allocated.
 StagingBuffers make_staging_buffers(const std::vector<Setup>& setups, const std::vector<State>& states,
                                     Capacity capacity);
 
-// extract.cpp. The inverse of make_staging_buffers, after kernels have worked on it. Skin vertices come in the order
-// (owner, direction), triangles in the order of their cells.
+// extract.cpp. The inverse of make_staging_buffers, after kernels have worked on it. Skin vertices have the order
+// (owner, direction), triangles that of their cells.
 std::vector<State> extract_states(const StagingBuffers& staging, const std::vector<Setup>& setups);
-// Only of the bodies that are wanted; the others' states are empty. `skins`: what an earlier call has found for bodies
-// whose skin stage has not run since; filled where it is empty.
+// Only of the wanted bodies; other states are empty. `skins`: results of earlier calls for bodies whose skin stage has
+// not run since; filled where empty.
 using KnownSkins = std::vector<std::optional<Skin>>;
 std::vector<State> extract_states(const StagingBuffers& staging, const std::vector<Setup>& setups,
                                   const std::vector<bool>& wanted, KnownSkins& skins);
 
-// How the last substep of a step moved the particles that are alive: how many of them by their group's map alone; by
-// it, in a grip; one by one, because something may touch their group; one by one, because they are in no group.
+// How the last substep of a step moved living particles: by their group's map alone; by it, in a grip; one by one,
+// because a contact may touch their group; one by one, because they are in no group.
 struct StepWork {
   int64_t carried = 0, held = 0, resolved = 0, loose = 0;
   int64_t groups = 0;  // of the first three
 
   friend bool operator==(const StepWork&, const StepWork&) = default;
 };
-// extract.cpp. From what the step leaves: of each group its head, and of each whether it is resolved (null: nothing can
-// touch any); the list of loose places.
+// extract.cpp. From the step's arrays: each group's head and whether it is resolved (null: no contacts); the list of
+// loose places.
 StepWork step_work_of(const Counters& counters, const GroupHead* heads, const int* resolved, const int* loose_places);
 
-// capacity.cpp. The extents of what has been loaded, whose arrays are as long as their contents. Throws MachineError if
-// one is beyond 32 bits.
+// capacity.cpp. Extents for loaded bodies, whose arrays are as long as their contents. Throws MachineError if one is
+// beyond 32 bits.
 Extents extents_of(const StagingBuffers& loaded, Capacity capacity);
-// What of these has been given out: as long is what a state is made from.
+// The used part of these extents; states are made from it.
 Extents in_use(const Extents& extents, const Counters& counters);
-// How many bytes of arrays that are at least so long [bytes] a load puts nothing into.
+// Bytes that a load leaves empty in arrays of at least `of_arrays` bytes.
 std::size_t empty_bytes(StagingBuffers& contents, std::size_t of_arrays);
-// Something is at least three quarters full, so the next load should have more capacity.
+// At least three quarters of some capacity are used, so the next load should have more.
 bool wants_capacity(const Extents& extents, const Counters& counters);
 // Throws MachineError if a capacity was too small for a stage.
 void require_no_fault(const Counters& counters);

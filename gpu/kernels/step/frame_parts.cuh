@@ -25,6 +25,7 @@ CUTPROOF_DEVICE inline Parts predicted_parts(const Pace& pace, const FrameParts&
   return {now.place.shape + pace.prediction_time * now.velocity.shape,
           now.place.motion + pace.prediction_time * now.velocity.motion};
 }
+// A moment of the remaining u and v, from the moments of u and of v - V.
 CUTPROOF_DEVICE inline float own_moment(const Parts& now, float of_shape, float of_motion) {
   return (1.0f + now.shape) * of_shape + now.motion * of_motion;
 }
