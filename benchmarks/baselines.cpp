@@ -17,7 +17,7 @@ namespace {
 
 constexpr const char* kDeletionNames[] = {"none", "particles", "clusters"};
 
-// Frames between two in which interpenetration is measured.
+// Interpenetration is measured in every so many frames.
 constexpr int64_t kOverlapEvery = 8;
 
 }  // namespace
@@ -48,7 +48,7 @@ ReadyScene make_baseline_scene(const Baseline& baseline, int64_t particles, uint
   scene.detect.remove = baseline.remove;
   scene.merge.rule = baseline.merge;
   scene.expand.rule = baseline.expand;
-  // The right grip lets go where the push begins, and only the schedule knows when that is.
+  // The right grip lets go where the push begins; only the schedule knows when.
   const GripSpec push = scene.grips.back();
   scene.grips.pop_back();
   fixtures::Built built = fixtures::build(scene, "command line");
@@ -125,7 +125,7 @@ nlohmann::json run_baseline(Backend& backend, const Baseline& baseline, const Re
   std::size_t removed = 0;
   int64_t isolated = 0, unequal_frames = 0;
   harness::TopologyFigures end;
-  oracles::Interpenetration overlap;  // the greatest of those looked at
+  oracles::Interpenetration overlap;  // the greatest measured
   State state = start;
   oracles::CarriedSweep sweep(scene.setup);
   for (int64_t frame = 0; frame < frames; ++frame) {
@@ -136,7 +136,7 @@ nlohmann::json run_baseline(Backend& backend, const Baseline& baseline, const Re
     if (is_swept) sweep.add(before, state);
     removed += state.removed.size() + state.debris.size();
     const bool last = frame + 1 == frames;
-    // Where nothing was removed, all is connected and coupled as before.
+    // Without a removal all is connected and coupled as before.
     if (frame == 0 || last || !state.removed.empty()) end = harness::topology_of(scene.setup, state);
     isolated = std::max(isolated, end.isolated);
     unequal_frames += !end.equal;

@@ -25,7 +25,7 @@ __global__ void walk_kernel(const int* next, int steps, int* end) {
   *end = at;
 }
 
-// Blocks meet `meetings` times; *missed counts those that another one has not yet reached when it goes on.
+// Blocks meet `meetings` times; *missed counts blocks that continue before another has arrived.
 __global__ void meet_kernel(int meetings, int* came, int* missed) {
   const cooperative_groups::grid_group grid = cooperative_groups::this_grid();
   for (int k = 0; k + 1 < meetings; ++k) grid.sync();
@@ -39,8 +39,7 @@ class Stopwatch {
  public:
   cudaStream_t stream() const { return stream_.get(); }
 
-  // Seconds that one piece of work takes, `turns` times: each of `repeat` pieces one after the other, so that handing
-  // over costs nothing.
+  // Seconds of one piece of work, `turns` times: a turn runs `repeat` pieces in sequence, which hides the launch.
   template <class Work>
   std::vector<double> seconds(int turns, int repeat, Work work) {
     for (int k = 0; k < repeat; ++k) work(stream());
@@ -91,8 +90,8 @@ DeviceMemory filled_memory(std::size_t bytes, int value) {
   return memory;
 }
 
-// A walk through every line of a buffer that the second cache holds and the first does not, in an order that nothing
-// foresees. The same on every device: from a fixed seed.
+// A walk through every line of a buffer that fits into the second cache but not the first, in unpredictable order. A
+// fixed seed makes it the same on every device.
 struct Walk {
   static constexpr int kLineInts = 32, kLines = 1 << 15;  // 128 bytes a line, 4 MiB
   std::vector<int> next = std::vector<int>(std::size_t{kLines} * kLineInts, 0);

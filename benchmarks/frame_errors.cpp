@@ -60,14 +60,14 @@ FrameErrors judge_frames(Backend& backend, const Setup& setup) {
       backend.run({stage, stage});
       const bool ran = backend.report().ran[at(stage)];
       const bool due = is_due(setup, stage, !state.removed.empty(), state.edge_covered);
-      if (!ran && !due && stage != Stage::skin) continue;  // skin counts up the frame
+      if (!ran && !due && stage != Stage::skin) continue;  // skin increments the frame
       State after = take_snapshot(backend);
       const oracles::StageDifference found = comparison.compare(stage, state, after, ran);
       if (ran || due) note(errors, found, after);
       state = std::move(after);
       cut |= stage == Stage::split;
       readable = found.is_readable;
-      if (!readable) break;  // as the oracles below will say
+      if (!readable) break;  // the oracles below report this
     }
     ++errors.frames;
   }

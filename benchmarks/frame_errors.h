@@ -1,4 +1,4 @@
-// The error of each stage: some frames in lockstep with the reference, and the topology of what they leave.
+// The error of each stage: some frames in lockstep with the reference, and the topology after them.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -11,13 +11,13 @@
 
 namespace cutproof::benchmarks {
 
-// Frames in lockstep (oracles/comparison/stage_comparison.h). Where no frame of those judged had a stage due, its entry
-// is empty.
+// Frames in lockstep (oracles/comparison/stage_comparison.h). Entries of stages that were due in no judged frame are
+// empty.
 struct FrameErrors {
-  int64_t frames = 0;  // that were judged
+  int64_t frames = 0;  // judged
   struct Step {
     oracles::ErrorNorm position;  // [h]
-    int64_t undecidable = 0;      // particles that are not measured, because rounding decides where they go
+    int64_t undecidable = 0;      // particles not measured, because rounding decides their place
   };
   std::optional<Step> step;
   struct Detection {
@@ -25,20 +25,20 @@ struct FrameErrors {
     bool within_rounding = true;         // oracle `detection`: every decision outside the rounding band is right
   };
   std::optional<Detection> detect;
-  // split, merge, expand: same clusters, same numbers. Empty too where a rule leaves several answers.
+  // split, merge, expand: same clusters, same numbers. Also empty where a rule allows several answers.
   std::array<std::optional<bool>, 6> clusters_equal;
   struct Surface {
     oracles::ErrorNorm vertices;  // [h]
     bool triangles_equal = true;  // as sets; vertices named by owner and direction
   };
   std::optional<Surface> skin;
-  std::vector<Verdict> topology;  // of the state after the last judged frame, by the oracles that cost little
-  // Coupled groups of clusters beyond the components of the tissue. Where clusters do not cover every edge nothing
-  // promises that there is none (method.md §2), so there it is counted, and `component match` is not asked for.
+  std::vector<Verdict> topology;  // of the state after the last judged frame, by cheap oracles
+  // Coupled groups of clusters beyond the components of the tissue. Clusters that do not cover every edge allow them
+  // (method.md §2). There they are counted, and `component match` is not checked.
   double isolated_groups = 0;
   bool topology_holds() const;
 };
-// Runs and judges frames of what `backend` has loaded until one of them has removed something, at most kJudgedFrames.
+// Runs and judges frames of the backend's load until one has removed something, at most kJudgedFrames.
 FrameErrors judge_frames(Backend& backend, const Setup& setup);
 
 }  // namespace cutproof::benchmarks

@@ -8,7 +8,8 @@ namespace cutproof::benchmarks {
 std::vector<std::optional<Slope>> slopes_of(const std::vector<std::vector<double>>& x, const std::vector<double>& y) {
   std::vector<std::optional<Slope>> slopes(x.size());
   const auto points = static_cast<Eigen::Index>(y.size());
-  // About their means, in which the constant drops out, and of length 1, so that no unit decides what counts as zero.
+  // Relative to their means, which removes the constant, and of length 1, so that units do not decide what counts as
+  // zero.
   const auto centered = [&](const std::vector<double>& values) -> Eigen::VectorXd {
     const Eigen::Map<const Eigen::VectorXd> vector(values.data(), points);
     return vector.array() - (points > 0 ? vector.mean() : 0);

@@ -1,4 +1,4 @@
-// How a figure goes with several others.
+// Dependence of a figure on several others.
 #pragma once
 #include <optional>
 #include <vector>
@@ -8,10 +8,9 @@ namespace cutproof::benchmarks {
 struct Slope {
   double value = 0, standard_error = 0;
 };
-// Least squares of y over a constant and all columns of x: the slope of each column and its standard error, from what
-// is left, whose squares are divided by the points less the columns and the constant. None for a column that does not
-// change; none for any if points are too few to tell an error, or if columns go together so that nothing tells which of
-// them it is. Requires columns as long as y.
+// Least squares of y over a constant and all columns of x: each column's slope and standard error. The error divides
+// the squared residuals by the number of points less columns and constant. A constant column has none. No column has
+// one if points are too few for an error or if columns are collinear. Requires columns as long as y.
 std::vector<std::optional<Slope>> slopes_of(const std::vector<std::vector<double>>& x, const std::vector<double>& y);
 
 }  // namespace cutproof::benchmarks

@@ -44,8 +44,7 @@ CUTPROOF_DEVICE void count_launch_kernel(Block& block, std::int64_t* launches) {
 }
 CUTPROOF_KERNEL(count_launch_kernel);
 
-// A kernel that does next to nothing, on the host's threads; many in a row, because one is below the clock's
-// resolution.
+// A nearly empty kernel on the host's threads; many in a row, because one is below the clock's resolution.
 MachineLimit launch_on_host(int threads, int blocks, int repeats) {
   constexpr int kLaunches = 200;
   gpu::HostLauncher launcher(gpu::HostLauncher::Threads{threads});

@@ -14,7 +14,7 @@ std::optional<int64_t> bytes_in_use([[maybe_unused]] const harness::BackendDescr
 #endif
 #ifdef __GLIBC__
   const struct mallinfo2 info = mallinfo2();
-  // Nothing at all: another allocator took its place, as a sanitizer's does.
+  // Zero if another allocator, such as a sanitizer's, has replaced this one.
   if (info.uordblks + info.hblkhd > 0) return static_cast<int64_t>(info.uordblks + info.hblkhd);
 #endif
   return std::nullopt;

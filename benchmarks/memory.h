@@ -1,4 +1,4 @@
-// How much memory is in use, to tell what a backend keeps by the difference.
+// Memory in use; the difference of two values is what a backend keeps.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -7,8 +7,8 @@
 
 namespace cutproof::benchmarks {
 
-// Bytes in use where `backend` keeps its state: on the device, or by this process, as its allocator counts them;
-// absent where that is not known. Throws MachineError if CUDA fails.
+// Bytes in use where `backend` keeps its state: on the device, or in this process by its allocator's count; absent if
+// unknown. Throws MachineError if CUDA fails.
 std::optional<int64_t> bytes_in_use(const harness::BackendDescriptor& backend);
 
 }  // namespace cutproof::benchmarks

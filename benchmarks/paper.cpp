@@ -55,7 +55,7 @@ Scene embedded_scene(const std::string& file) {
 
 namespace {
 
-// The first frame in which the blade is down for the last stroke, and the last one.
+// The first frame of the last stroke, and its last frame.
 std::pair<int64_t, int64_t> last_stroke(const Setup& setup) {
   const auto stroke = static_cast<int32_t>(setup.stroke_end.size()) - 1;
   std::pair<int64_t, int64_t> frames = {setup.frame_count(), -1};

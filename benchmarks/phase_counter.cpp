@@ -26,7 +26,7 @@ class PhaseCounter {
   void blocks(Kernel, int64_t, int, std::size_t, const Args&...) {
     ++phases_;
   }
-  // What is inside waits for a node that reads the flag.
+  // The body waits for a node that reads the flag.
   template <class Body>
   void if_nonzero(const int* flag, Body body) {
     ++phases_;
@@ -38,7 +38,7 @@ class PhaseCounter {
     body(*this);
   }
   static constexpr bool overlaps() { return true; }
-  // Of chains the longest one counts.
+  // The longest of the chains counts.
   template <class First, class Second, class AfterFirst = gpu::NoWork, class AfterBoth = gpu::NoWork>
   void side_by_side(First first, Second second, AfterFirst after_first = {}, AfterBoth after_both = {}) {
     PhaseCounter beside;

@@ -1,4 +1,4 @@
-// How many kernels of a frame wait for one another: what the graph of a span is made of, counted from the text that the
+// The number of a frame's kernels that wait for one another: parts of a span's graph, counted from the code that the
 // graph is captured from (gpu/frame.h).
 #pragma once
 #include <array>
@@ -9,10 +9,9 @@
 
 namespace cutproof::benchmarks {
 
-// Kernels one after the other in the span of each stage alone, in a frame that cuts: conditions hold that hold in an
-// ordinary cutting frame (something is removed, clusters follow, some merge or grow; nothing fails, no body's whole
-// tissue is labelled, no cluster is larger than a block labels), a loop turns once, and what a library does by several
-// kernels counts as one.
+// Sequential kernels of each stage's own span, in a frame that cuts. Conditions have their values in an ordinary
+// cutting frame. Something is removed, clusters follow, some merge or grow. Nothing fails, no body's whole tissue is
+// labelled, no cluster is too large for a block. A loop runs once, and a library call of several kernels counts as one.
 std::array<int64_t, kStages.size()> phases_of_stages(const gpu::Plan& plan);
 
 }  // namespace cutproof::benchmarks

@@ -15,7 +15,7 @@
 namespace cutproof::gpu {
 namespace {
 
-// As step/particle.cuh updates particles, with the goal already averaged: x = x~ + s (g - x~), and v from the motion.
+// The update of step/particle.cuh, with the goal already averaged: x = x~ + s (g - x~), and v from the motion.
 struct Particles {
   const Float4* predicted;
   const Float4* goal;
@@ -46,8 +46,8 @@ __global__ void __launch_bounds__(256) raw_update_particles_kernel(const __grid_
   }
 }
 
-// A warp for each cluster of kClusterSize particles, as the sums over members in the kernels: t = Σ w x / n, which
-// every lane needs, and each member's w (x - t).
+// A warp for each cluster of kClusterSize particles, as in the kernels' sums over members: t = Σ w x / n, which every
+// lane needs, and each member's w (x - t).
 constexpr int kClusterSize = 125;
 struct Clusters {
   const Float4* position;
@@ -159,7 +159,7 @@ double median(std::vector<double> values) {
 }
 
 // Both in turns, so that clocks and caches treat them alike; the first turns do not count. A turn is a queue of
-// launches: of a single one the host's own time to launch it would be part.
+// launches, because a single one would include the host's launch time.
 constexpr int kLaunchesInATurn = 16;
 template <class Layer, class Raw>
 void time_both(Layer layer, Raw raw, int launches, KernelComparison& result) {

@@ -1,4 +1,4 @@
-// Kernels that are written twice, against DeviceBlock and as plain CUDA, to show what the launch layer costs
+// Kernels written twice, against DeviceBlock and as plain CUDA, to measure the cost of the launch layer
 // (docs/design/kernels.md, Blocks).
 #pragma once
 #include <string>
@@ -9,7 +9,7 @@ namespace cutproof::gpu {
 struct KernelCost {
   int registers = 0;        // per thread
   std::size_t stack = 0;    // bytes of local memory per thread, spills included
-  std::size_t shared = 0;   // bytes of shared memory per block that the code asks for by itself
+  std::size_t shared = 0;   // bytes of shared memory per block that the code declares
   double microseconds = 0;  // median of the launches
 };
 

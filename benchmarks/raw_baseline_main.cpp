@@ -1,4 +1,4 @@
-// Prints what the launch layer costs, as JSON. Usage: raw_baseline [PARTICLES [LAUNCHES]]
+// Prints the cost of the launch layer as JSON. Usage: raw_baseline [PARTICLES [LAUNCHES]]
 // Exit status: 0; 2: wrong arguments; 3: no device, or CUDA failed.
 #include <cstdio>
 #include <exception>

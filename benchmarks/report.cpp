@@ -23,7 +23,7 @@ nlohmann::json begin_document(const std::string& suite, const std::string& backe
                              {"cutproof", CUTPROOF_VERSION},
                              {"date", fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)))},
                              {"backend", backend},
-                             // The processor and how many of its threads work, or the CUDA device.
+                             // The processor and its working threads, or the CUDA device.
                              {"device", harness::processor_of(harness::described_backend(backend))},
                              {"complete", false}};
   const char* const commit = std::getenv("CUTPROOF_COMMIT");

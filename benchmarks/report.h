@@ -1,4 +1,4 @@
-// The document that a suite of `bench`, or `tune`, leaves: docs/reference/schemas/ says what each field means.
+// The document of a suite of `bench`, or of `tune`: docs/reference/schemas/ describes its fields.
 #pragma once
 #include <functional>
 #include <memory>
@@ -9,25 +9,24 @@
 
 namespace cutproof::benchmarks {
 
-// Where a result comes from: the fields with which every document begins. `complete` is false, as in what a run leaves
-// that fails or is stopped later.
+// The fields with which every document begins. `complete` is false, as it stays if the run fails or is stopped.
 nlohmann::json begin_document(const std::string& suite, const std::string& backend);
 
-// Called before anything is measured, when there is only the head, and again after each row: so what has been measured
-// can be shown, and is kept if a later measurement fails. What it throws ends the suite (model/stop.h).
+// Called with the head alone before any measurement, and again after each row. So rows can be shown at once, and
+// survive a later failure. An exception that it throws ends the suite (model/stop.h).
 using Progress = std::function<void(const nlohmann::json& so_far)>;
 
-// A suite's document while it grows.
+// A growing document.
 class Report {
  public:
-  // Shows it, with the suite's own `fields` and no row. Rows are added to the list `list`.
+  // Shows it with the suite's own `fields` and no row. Rows go into the list `list`.
   Report(const std::string& suite, const std::string& backend, const nlohmann::json& fields, const Progress& progress,
          const std::string& list = "rows");
-  // `holds`: what the suite judges of it.
+  // `holds`: the suite's judgement of the row.
   void add(nlohmann::json row, bool holds = true);
-  // Shows a copy that has what was timed, while it is being judged: whoever keeps it has the times if that is cut off.
+  // Shows a copy with times that are being judged, so that they survive if judging is interrupted.
   void show_timed(nlohmann::json so_far) const;
-  // With the last row in it.
+  // Includes the last row.
   nlohmann::json complete();
 
   nlohmann::json document;
@@ -37,10 +36,9 @@ class Report {
   std::string list_;
 };
 
-// Refuses what cannot be timed: throws InputError for a backend that does not exist, is not in this build or is for
-// finding faults, MachineError if there is no device.
+// Throws InputError for a backend that does not exist, is not in this build or only finds faults; MachineError if there
+// is no device.
 const harness::BackendDescriptor& require_timed_backend(const std::string& backend);
-// One that is not refused.
 std::unique_ptr<Backend> make_timed_backend(const std::string& backend);
 
 // Throws InputError for an option of the command line unless `fine`.

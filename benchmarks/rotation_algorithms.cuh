@@ -1,6 +1,6 @@
-// Methods for the rotation of a cluster that `cutproof bench rotations` measures: that of the step, and others, most of
-// which fail on hard cases (docs/results/accuracy.md, Rotations). A method is a type with a name and a function
-// `rotate` for both precisions: argmax over rotations R of tr(Rᵀ A), `previous` where A is zero or not finite.
+// Methods for the rotation of a cluster that `cutproof bench rotations` measures: the step's, and others, most of which
+// fail on hard cases (docs/results/accuracy.md, Rotations). A method is a type with a name and a function `rotate` for
+// both precisions. It returns argmax over rotations R of tr(Rᵀ A), or `previous` where A is zero or not finite.
 #pragma once
 #include <type_traits>
 
@@ -25,7 +25,7 @@ CUTPROOF_BOTH inline float cosine(float a) { return cosf(a); }
 CUTPROOF_BOTH inline double cosine(double a) { return cos(a); }
 
 // Müller, Bender, Chentanez, Macklin 2016, "A robust method to extract the rotational part of deformations": torques
-// turn the previous rotation. Never leaves an exact half turn, and stalls as σ2 + σ3 -> 0.
+// rotate the previous rotation. Never leaves an exact half turn, and stalls as σ2 + σ3 -> 0.
 template <int MostIterations, class Real>
 CUTPROOF_BOTH inline Rotation<Real> by_mueller2016(const Matrix3x3<Real>& a, const Matrix3x3<Real>& previous) {
   Quaternion<Real> q = quaternion_of(previous);
@@ -54,7 +54,7 @@ CUTPROOF_BOTH inline Rotation<Real> by_apd(const Matrix3x3<Real>& a, const Matri
   for (int iteration = 0; iteration < 20; ++iteration) {
     const Expansion<Real> e = expand(a, matrix_of(q));
     Vector3<Real> omega = e.scaled_step();
-    // Entries of A are below 1, so that 0.25 of the gradient is a short step.
+    // Entries of A are below 1, so 0.25 of the gradient is a short step.
     const bool newton = absolute(e.determinant) > rounding<Real>(1e-9) && gpu::dot(omega, e.g) * e.determinant > 0;
     omega = (newton ? 1 / e.determinant : 0) * omega + (newton ? 0 : Real(0.25)) * e.g;
     q = normalized(turned(q, omega));
@@ -87,13 +87,13 @@ CUTPROOF_BOTH inline void order(Vector3<Real> (&b)[3], Vector3<Real> (&v)[3]) {
   v[Q] = swap ? -1 * vp : vq;
 }
 
-// Singular values smaller than this, relative to the greatest, are rounding: ignoring two of them costs at most four
-// times this much of the objective.
+// Smaller singular values, relative to the greatest, are rounding: ignoring two of them costs at most four times this
+// much of the objective.
 template <class Real>
 inline constexpr Real kSameDirection = rounding<Real>(0x1p-23);
 
-// One-sided Jacobi: A V = U Σ. Only the first two directions of each side are used and the third is their product,
-// which is what a reflection needs: its smallest singular value is the one given up.
+// One-sided Jacobi: A V = U Σ. The third direction of each side is the product of the first two. A reflection needs
+// this: its smallest singular value is given up.
 template <class Real>
 CUTPROOF_BOTH inline Rotation<Real> by_svd(const Matrix3x3<Real>& a, const Matrix3x3<Real>& previous) {
   Vector3<Real> b[3] = {column(a, 0), column(a, 1), column(a, 2)};
@@ -121,8 +121,8 @@ CUTPROOF_BOTH inline Rotation<Real> by_svd(const Matrix3x3<Real>& a, const Matri
     u1 = u1 - gpu::dot(u0, u1) * u0;
     if (norm(u1) < Real(0.1)) u1 = cross(u0, previous * cross(v[0], v[1]));  // half a turn about `side`'s normal
   } else if (gpu::dot(cross(u0, u1), b[2]) * gpu::dot(v[2], cross(v[0], v[1])) < 0) {
-    // A reflection: not unique if the two smallest singular values are equal. This method does not look for the
-    // answer nearest to the previous one.
+    // A reflection is not unique if the two smallest singular values are equal. This method does not look for the
+    // answer nearest to the previous rotation.
     result.degenerate = norm(b[1]) - norm(b[2]) <= kSameDirection<Real> * sigma;
   }
   u1 = (1 / norm(u1)) * u1;
@@ -162,7 +162,7 @@ CUTPROOF_BOTH inline Rotation<Real> by_quest(const Matrix3x3<Real>& a, const Mat
   Real c[6], s[6];
   minors(n, c, s);
   const Real constant = s[0] * c[5] - s[1] * c[4] + s[2] * c[3] + s[3] * c[2] - s[4] * c[1] + s[5] * c[0];
-  Real top = root(3 * squares);  // λ = σ1 + σ2 ± σ3 is never above it
+  Real top = root(3 * squares);  // upper bound of λ = σ1 + σ2 ± σ3
   for (int iteration = 0; iteration < 30; ++iteration) {
     const Real value = ((top * top - 2 * squares) * top - 8 * determinant) * top + constant;
     const Real slope = (4 * top * top - 4 * squares) * top - 8 * determinant;
@@ -173,7 +173,7 @@ CUTPROOF_BOTH inline Rotation<Real> by_quest(const Matrix3x3<Real>& a, const Mat
   }
   for (int k = 0; k < 4; ++k) n[k][k] -= top;
   minors(n, c, s);
-  // Columns of the adjugate; of a symmetric matrix of rank three they are multiples of the eigenvector.
+  // Columns of the adjugate; with rank three they are multiples of the symmetric matrix's eigenvector.
   const Quaternion<Real> columns[4] = {
       {n[1][1] * c[5] - n[1][2] * c[4] + n[1][3] * c[3], -n[1][0] * c[5] + n[1][2] * c[2] - n[1][3] * c[1],
        n[1][0] * c[4] - n[1][1] * c[2] + n[1][3] * c[0], -n[1][0] * c[3] + n[1][1] * c[1] - n[1][2] * c[0]},
@@ -199,11 +199,11 @@ struct Newton {
     return gpu::rotate(a, previous);
   }
 };
-// What the step does.
+// The step's method.
 template <class Method, class Real>
 inline constexpr bool kIsDefault = std::is_same_v<Method, Newton> && sizeof(Real) == sizeof(float);
 
-// What Newton's method falls back on.
+// The fallback of the step's method.
 struct Jacobi4 {
   static constexpr const char* kName = "jacobi4";
   template <class Real>
@@ -249,7 +249,7 @@ struct Mueller {
   }
 };
 
-// Müller 2016 without the previous rotation, with as many iterations as it may want.
+// Müller 2016 without the previous rotation, with enough iterations.
 struct MuellerCold {
   static constexpr const char* kName = "mueller_cold";
   template <class Real>
@@ -261,7 +261,7 @@ struct MuellerCold {
 
 // McAdams, Selle, Tamstorf, Teran, Sifakis 2011, "Computing the singular value decomposition of 3×3 matrices with
 // minimal branching and elementary floating point operations": Jacobi on AᵀA with approximate Givens rotations, four
-// sweeps, then a QR decomposition of A V; U and V as quaternions. Scaled before, which the paper does not do.
+// sweeps, then a QR decomposition of A V; U and V as quaternions. Unlike the paper, A is scaled first.
 struct McAdams {
   static constexpr const char* kName = "mcadams";
   template <class Real>
@@ -302,7 +302,7 @@ struct McAdams {
     return gpu::rotation_detail::column(m, k);
   }
 
-  // Half the turn that takes axis P towards axis Q, as a quaternion (ch, sh about the third axis).
+  // Half the rotation from axis P towards axis Q, as a quaternion (ch, sh about the third axis).
   template <int P, int Q, class Real>
   CUTPROOF_BOTH static gpu::Quaternion<Real> half_turn(Real ch, Real sh) {
     constexpr int kSign = (Q - P + 3) % 3 == 1 ? 1 : -1;  // P × Q is the third axis or its opposite
@@ -345,7 +345,7 @@ struct McAdams {
     v = v * half_turn<P, Q>(Real(kHalf), Real(kHalf));
   }
 
-  // Turns rows P and Q of B such that B(Q, P) vanishes; U becomes U G (§4).
+  // Rotates rows P and Q of B such that B(Q, P) vanishes; U becomes U G (§4).
   template <int P, int Q, class Real>
   CUTPROOF_BOTH static void eliminate(gpu::Matrix3x3<Real>& b, gpu::Quaternion<Real>& u) {
     using gpu::rotation_detail::operator*;

@@ -1,5 +1,5 @@
-// The kernel that `cutproof bench rotations` times: it reads A and the previous R, rotates, writes R. On the host and
-// on the device, in both precisions, for the method of the step and for others beside it.
+// The kernel that `cutproof bench rotations` times: it reads A and the previous R, rotates, writes R. On host and
+// device, in both precisions, for the step's method and others.
 #pragma once
 #include <cstdint>
 
@@ -17,7 +17,7 @@ struct RotationBatch {
   unsigned char* flagged = nullptr;
   std::int64_t count = 0;
 };
-// What is read and written for each matrix.
+// Input and output of each matrix.
 template <class Real>
 inline constexpr std::int64_t kRotationBytes = 27 * sizeof(Real) + 1;
 
@@ -33,7 +33,7 @@ CUTPROOF_BOTH inline void rotate_one(const RotationBatch<Real>& batch, std::int6
   batch.flagged[i] = best.degenerate;
 }
 
-// CUTPROOF_KERNEL (launcher.h) by hand, because that cannot carry template arguments.
+// CUTPROOF_KERNEL (launcher.h) by hand, because the macro takes no template arguments.
 template <class Method, class Real>
 struct rotate_matrices_kernel_object {
   static constexpr const char* kName = "rotate_matrices_kernel";

@@ -14,7 +14,7 @@ namespace cutproof::benchmarks {
 
 namespace {
 
-// Scaled and guarded as the kernels' methods are, so that only the decomposition is compared.
+// Scaled and guarded like the kernels' methods, so that only the decomposition is compared.
 struct EigenSvd {
   static constexpr const char* kName = "eigen_svd";
   template <class Real>
@@ -30,7 +30,7 @@ struct EigenSvd {
   }
 };
 
-// What the CPU reference does in a step.
+// The CPU reference's method.
 struct Horn {
   static constexpr const char* kName = "horn";
   static gpu::Rotation<double> rotate(const gpu::Matrix3x3<double>& a, const gpu::Matrix3x3<double>& previous) {

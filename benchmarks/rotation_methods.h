@@ -1,5 +1,4 @@
-// Ways to solve many rotation problems at once, each with its times; on the CPU and, in builds that have it, on a CUDA
-// device.
+// Ways to solve many rotation problems at once, with times; on the CPU and, in builds with CUDA, on a device.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -13,28 +12,28 @@ namespace cutproof::benchmarks {
 
 struct TimedAnswers {
   fixtures::Answers answers;
-  std::vector<double> seconds;  // [repeats] for all matrices together, of what was done after a first time
+  std::vector<double> seconds;  // [repeats] for all matrices together, after an untimed run
 };
 
 struct RotationMethod {
   std::string name;
   Precision precision = Precision::binary32;
-  bool is_default = false;  // what the kernels' step does
+  bool is_default = false;  // the method of the kernels' step
   int64_t bytes = 0;        // read and written for each matrix
   // Matrix i starts from previous[i], every time.
   std::function<TimedAnswers(const std::vector<Mat3>& a, const std::vector<Mat3>& previous, int repeats)> solve;
 };
 
-// On one thread: one after the other. On all threads: as a kernel. On a device: as a kernel, timed by CUDA events
-// around the launch. The methods of kernels in both precisions, and beside them Müller's from a cold start,
-// McAdams', and on the CPU Eigen's JacobiSVD and, in double, the reference's (horn).
+// On one thread: sequentially. On all threads: as a kernel. On a device: as a kernel, timed by CUDA events around the
+// launch. The kernels' methods in both precisions, Müller's from a cold start, McAdams', and on the CPU Eigen's
+// JacobiSVD and, in double, the reference's (horn).
 std::vector<RotationMethod> rotation_methods(const harness::BackendDescriptor& backend);
 
 #if CUTPROOF_HAS_CUDA
 std::vector<RotationMethod> device_rotation_methods();
 #endif
 
-// How matrices lie in memory: entry k of matrix i at [k · n + i] (rotation_kernel.cuh).
+// Layout of matrices in memory: entry k of matrix i at [k · n + i] (rotation_kernel.cuh).
 template <class Real>
 std::vector<Real> interleaved(const std::vector<Mat3>& matrices) {
   std::vector<Real> values(9 * matrices.size());

@@ -39,7 +39,7 @@ void sum_up(RotationResult& result) {
   }
 }
 
-// What a method's sums and each of its cases have in common.
+// The fields common to a method's sums and to each of its cases.
 json row_of(const RotationResult& result, const fixtures::Judged& judged) {
   return {{"method", result.method},
           {"precision", name_of(result.precision)},

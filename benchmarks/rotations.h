@@ -24,9 +24,9 @@ struct RotationResult {
   std::vector<RotationCaseResult> cases;
   Times near, cold;        // [s] per million matrices
   double limit = 0;        // [s] per million matrices: bytes / copy bandwidth
-  bool on_front = false;   // no other of its precision is at least as exact and as fast, and better in one of both
-  fixtures::Judged all;    // over all cases: sums, and the worst
-  std::string worst_case;  // where its worst gap is
+  bool on_front = false;   // no other of its precision is at least as exact and as fast, and better in one
+  fixtures::Judged all;    // sums over all cases, and the worst
+  std::string worst_case;  // of its worst gap
 };
 
 struct RotationCounts {
@@ -38,24 +38,24 @@ struct RotationCounts {
 
 struct RotationReport {
   std::vector<RotationResult> results;
-  // The greatest, of the best values that were compared with.
+  // The greatest error of the best values for comparison.
   double reference_error_single = 0, reference_error_double = 0;
-  // The default is there, and none of its answers is wrong.
+  // Whether the default was measured and gave no wrong answer.
   bool default_holds() const;
 };
 
-// Called before each method is asked, in each case and to be timed: how many cases have begun, and what is done now.
-// What it throws ends the measurement (model/stop.h).
+// Called before each method of each case and before each timing: the number of cases begun, and the present work. An
+// exception that it throws ends the measurement (model/stop.h).
 using RotationProgress = std::function<void(int64_t cases_begun, const std::string& what)>;
 
-// `copy_bytes_per_second` for the limits.
+// `copy_bytes_per_second`: for the limits.
 RotationReport measure_rotations(const std::vector<RotationMethod>& methods, const RotationCounts& counts,
                                  double copy_bytes_per_second, const RotationProgress& progress = {});
 
 // Marks on_front: the worst gap against the median time near the answer.
 void mark_front(std::vector<RotationResult>& results);
 
-// What counts as near the answer [rad]: an ordinary substep turns a cluster by less.
+// Greatest rotation near the answer [rad]: an ordinary substep rotates a cluster by less.
 inline constexpr double kNearTurn = 0.02;
 
 // The fields `bounds`, `cases`, `methods`, `rows` and `holds` of the document.

@@ -36,7 +36,7 @@ TimedAnswers solve_on_device(const std::vector<Mat3>& a, const std::vector<Mat3>
   const gpu::Stream stream = gpu::make_stream();
   const gpu::Event begin = gpu::make_event(), end = gpu::make_event();
   gpu::DeviceLauncher launcher(stream.get());
-  CUTPROOF_CUDA(cudaDeviceSynchronize());  // what was copied above is there
+  CUTPROOF_CUDA(cudaDeviceSynchronize());  // completes the copies above
   for (int turn = -1; turn < repeats; ++turn) {
     CUTPROOF_CUDA(cudaEventRecord(begin.get(), stream.get()));
     launcher.items(rotate_matrices_kernel_object<Method, Real>{}, batch.count, batch);

@@ -42,7 +42,7 @@ BenchScene make_bench_scene(int64_t particles, int64_t frames, Cooking cooking) 
   spec.body.particles = particles;
   spec.step.substeps = 4;
   spec.step.iterations = 4;
-  spec.step.acceleration = Acceleration::none;  // this and the next: the same work as since figures are kept
+  spec.step.acceleration = Acceleration::none;  // as is the next one: comparable with earlier results
   spec.detect.remove = RemovedEnds::both;
   spec.step.stiffness = 1e5;
   spec.step.damping = 5;
@@ -55,7 +55,7 @@ BenchScene make_bench_scene(int64_t particles, int64_t frames, Cooking cooking) 
   setup.body = fixtures::sample(fixtures::solid_from_shape(shape, kind), spec.body, "command line");
   fixtures::take_stage_parameters(spec, setup);
 
-  // The blade goes along x. It is well under way after a quarter of the body and has still something to cut at the end.
+  // The blade moves along x. A quarter of the body lies before the timed frames, and some tissue is left after them.
   const fixtures::Bounds bounds = fixtures::path_box(setup.body);
   const Vec3 extent = bounds.high - bounds.low;
   const double h = setup.body.grid.spacing;
@@ -64,7 +64,7 @@ BenchScene make_bench_scene(int64_t particles, int64_t frames, Cooking cooking) 
   scene.warm_up = static_cast<int64_t>(std::ceil(0.25 * layers / scene.advance));
   const int64_t all = scene.warm_up + frames + kJudgedFrames;
 
-  // Halfway between two layers of nodes: on a layer the side of the blade would be decided by rounding.
+  // Halfway between two layers of nodes: on a layer rounding would decide the side of the blade.
   const double cut = std::floor(0.5 * extent.z / h) * h / extent.z;
   const double start = 1 + h / extent.x;
   BladeSpec blade;

@@ -38,7 +38,7 @@ std::vector<ScenePart> parts_of(const Scene& scene, int64_t frames, std::optiona
     drop(parts.back().without);
   };
   const StepParameters& step = scene.step;
-  // A geometric blade does nothing but cut, and one that does not cut would push instead: there detection is the blade.
+  // A geometric blade only cuts, and would push if it did not cut: there detection is the blade.
   const Criterion criterion = scene.detect.criterion;
   const bool cuts = scene.blade && criterion != Criterion::none && criterion != Criterion::geometric;
   add(step.acceleration != Acceleration::none, "acceleration",

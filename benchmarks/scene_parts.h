@@ -1,4 +1,4 @@
-// What a scene could do without, one part at a time.
+// The optional parts of a scene, one at a time.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -12,13 +12,13 @@ namespace cutproof::benchmarks {
 struct ScenePart {
   std::string name;  // docs/reference/schemas/bench_parts.json lists them
   Scene without;     // has everything else
-  // Clusters are cooked by it, too: so that nothing else differs, a run without it begins with those of the scene as it
-  // is.
+  // Cooking depends on it, too. A run without it begins with the clusters of the full scene, so that nothing else
+  // differs.
   bool cooks = false;
 };
-// Those that `scene` has, in the order in which a frame comes to them. What is left of it has as many frames as before,
-// `frames`, though it may end with what is left out; and without its blade what counts from the end of the last stroke
-// still happens then (`strokes_end` [s]; none: the frames end before).
+// The parts of `scene`, in their order in a frame. The rest of the scene keeps its `frames`, even if it could end
+// earlier. Without its blade, events timed from the end of the last stroke still happen then (`strokes_end` [s]; none:
+// the frames end before).
 std::vector<ScenePart> parts_of(const Scene& scene, int64_t frames, std::optional<double> strokes_end);
 
 }  // namespace cutproof::benchmarks

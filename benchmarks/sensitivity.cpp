@@ -20,17 +20,17 @@ using oracles::Measure;
 
 constexpr double kEarth = 9.81;              // [m/s²] of a weight, also where a scene has no gravity
 constexpr Vec3 kAlong = {0.36, -0.48, 0.8};  // of length 1, along no axis
-constexpr double kFinest = 1.05;             // ratio of sizes between which nothing is tried any more
+constexpr double kFinest = 1.05;             // ratio of sizes at which bisection ends
 constexpr double kParameters = 1e-3, kForces = 1e-4;
 
 double spacing(const Setup& setup) { return setup.body.grid.spacing; }
 
-// [s] of the frame that a state is in or has just ended.
+// Length of a substep [s] in the state's frame; after the schedule, in its last frame.
 double substep_of(const Setup& setup, const State& state) {
   return setup.substep_length[at(std::min(state.frame, setup.frame_count() - 1))];
 }
 
-// The alive particle nearest to the middle of the list, or -1.
+// The living particle nearest to the middle of the list, or -1.
 int32_t middle_particle(const State& state) {
   const auto n = static_cast<int32_t>(state.alive.size());
   for (int32_t away = 0; away <= n; ++away) {
@@ -70,8 +70,8 @@ double mass_of(const Setup& setup, const State& state) {
   return mass;
 }
 
-// Equal and opposite impulses on the first two components along the line between them, in weights of the lighter one
-// over the frame.
+// Equal and opposite impulses on the first two components along the line between them. Unit: the weight of the lighter
+// one over the frame.
 bool draw_together(Setup& setup, State& before, double size) {
   const oracles::Partition partition = oracles::graph_components(setup, before);
   if (partition.count < 2) return false;
@@ -157,7 +157,7 @@ std::vector<Disturbance> make_disturbances() {
     setup.step.stiffness *= 1 + size;
     return setup.step.solver == Solver::implicit && setup.step.iterations > 0;
   });
-  // Less of it: more holds what is held already.
+  // Friction is reduced: more holds only what is held already.
   run("friction", "1", kParameters, [](Setup& setup, State&, double size) {
     bool any = setup.has_blade && setup.blade.friction > 0;
     setup.blade.friction /= 1 + size;
@@ -181,7 +181,7 @@ std::optional<Verdict> first_failure(const Setup& setup, const harness::Moment& 
   return std::nullopt;
 }
 
-// The moment as it is with the disturbance; nothing where there is nothing to change.
+// The moment under the disturbance; empty if there is nothing to change.
 std::optional<harness::Moment> disturbed(Backend& backend, const Setup& setup, const Disturbance& disturbance,
                                          double size, harness::Moment moment) {
   if (disturbance.of_state) {
@@ -200,7 +200,7 @@ std::optional<harness::Moment> disturbed(Backend& backend, const Setup& setup, c
   return moment;
 }
 
-// Shows the iterates of steps as a simulator would that is wrong in this way.
+// A simulator with this error that shows its iterates.
 class Disturbed final : public Backend {
  public:
   Disturbed(Backend& right, const Disturbance& disturbance, double size)
@@ -213,7 +213,7 @@ class Disturbed final : public Backend {
   void load(std::vector<Setup> setups, std::vector<State> states) override {
     setups_ = setups;
     has_run_ = false;
-    // What is wrong is the step, and not what it begins with.
+    // The step is wrong, not its initial state.
     right_.load(setups, states);
     held_ = right_.snapshot();
     for (std::size_t b = 0; b < setups.size() && disturbance_.of_run; ++b) {
@@ -331,7 +331,7 @@ Sensitivity least_rejected(Backend& backend, const Setup& setup, const Disturban
     const double middle = std::sqrt(above * below);
     (rejects(middle) ? above : below) = middle;
   }
-  // `property` is that of the last size that was rejected, which is the least.
+  // `property` is that of the last rejected size, the least.
   found.least = above;
   return found;
 }

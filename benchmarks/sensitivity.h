@@ -1,4 +1,4 @@
-// How small a disturbance the judge of runs still rejects, beside what correct code is off by.
+// The smallest disturbance that the judge of runs rejects, beside the rounding of correct code.
 #pragma once
 #include <functional>
 #include <optional>
@@ -16,46 +16,45 @@ namespace cutproof::benchmarks {
 
 inline constexpr double kLeastSize = 1e-15, kGreatestSize = 1e2;
 
-// Something that is changed by a size in `unit`. Of a state it is put on what a stage left; else on what a simulator
-// takes for the scene and the state before its step, which it then runs.
+// A change by a size in `unit`. A disturbance of a state applies to the result of a stage. Any other applies to the
+// scene and to the state before the step, from which a simulator then runs.
 struct Disturbance {
   std::string name, unit;
   std::function<void(const Setup& setup, State& state, double size)> of_state = {};
-  // Whether there was something to change.
+  // Returns whether there was something to change.
   std::function<bool(Setup& setup, State& before, double size)> of_run = {};
-  // What correct code is off by in the same unit; nothing where no comparison measures that.
+  // The rounding of correct code in the same unit; empty where no comparison measures it.
   std::function<double(const oracles::StageDifference& found)> rounding = {};
-  // Least that should be rejected, where that is no multiple of rounding.
+  // Size that should be rejected, where it is no multiple of rounding.
   std::optional<double> goal = {};
-  double greatest = kGreatestSize;  // that is tried; beyond half a turn a rotation comes back
+  double greatest = kGreatestSize;  // tried; beyond half a turn a rotation comes back
 };
-// Of one particle, cluster or vertex, the one in the middle of its list: position, velocity, impulse, rotation, mass,
-// rest center, skin vertex. Of the run: gravity, stiffness, friction, impulse between pieces.
+// Of the middle particle, cluster or vertex of its list: position, velocity, impulse, rotation, mass, rest center, skin
+// vertex. Of the run: gravity, stiffness, friction, impulse between pieces.
 const std::vector<Disturbance>& disturbances();
 
-// Of a disturbance of state: this many times what correct code is off by.
+// Goal of disturbances of states, in roundings of correct code.
 inline constexpr double kRoundingsAllowed = 10;
 
-// A run that was kept, and what the judge says of it as it is.
+// A kept run and its verdicts without a disturbance.
 struct KeptRun {
   harness::Trace trace;
   harness::PropertySummaries properties;
   std::vector<Verdict> failed;
 };
-// Throws Stopped between two of its moments, here and below, if that is asked.
+// Throws Stopped between two of its moments, here and below, if requested.
 KeptRun keep_run(Backend& backend, const ReadyScene& scene, const StopAsked& stop_asked = {});
 
-// At most `count` moments, evenly over those in which this stage alone was due.
+// At most `count` moments, evenly over those in which only this stage was due.
 std::vector<harness::Moment> moments_of(const Setup& setup, const harness::Trace& trace, Stage stage, int64_t count);
 
 struct Sensitivity {
-  int64_t moments = 0;  // in which there was something to change
-  std::optional<double>
-      least;  // rejected in one of the moments or more; nothing if nothing was, up to the greatest that is tried
+  int64_t moments = 0;             // with something to change
+  std::optional<double> least;     // rejected in a moment; empty if nothing was, up to the greatest size
   std::string property;            // that rejects it, the first in the order of verdicts
   std::optional<double> rounding;  // greatest over the same moments
 };
-// Bisects, as if all that is greater than a size that is rejected were rejected too, up to 5 % of the size.
+// Bisects down to 5 % of the size, as if every size above a rejected one were rejected too.
 Sensitivity least_rejected(Backend& backend, const Setup& setup, const Disturbance& disturbance, Stage stage,
                            const std::vector<harness::Moment>& moments, const StopAsked& stop_asked = {});
 

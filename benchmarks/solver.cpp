@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kFrameLength = 0.004;  // [s]
 
-// Turned about the longest axis and drawn out along it, when the free motion of the frame is over.
+// Twisted about the longest axis and stretched along it at the end of the frame's free motion.
 void throw_body(ReadyScene& scene, double twist, double stretch) {
   const Body& body = scene.setup.body;
   Vec3 low, high;
@@ -41,7 +41,7 @@ void throw_body(ReadyScene& scene, double twist, double stretch) {
   }
 }
 
-// One frame of so many substeps in which what is held stays where it is.
+// One frame of so many substeps; held particles stay in place.
 void divide_frame(Setup& setup, int32_t substeps) {
   setup.step.substeps = substeps;
   setup.substep_length = {kFrameLength / substeps};
@@ -51,7 +51,7 @@ void divide_frame(Setup& setup, int32_t substeps) {
   }
 }
 
-// Nothing but the step, in one frame of one substep.
+// Only the step, in one frame of one substep.
 void keep_the_step(Setup& setup) {
   setup.step.damping = 0;
   remove_nothing(setup.detect);
@@ -91,7 +91,7 @@ Setup with_substeps(const ReadyScene& scene, int32_t substeps) {
 }
 
 FrameSolution converged_frame(const Setup& setup, const State& state) {
-  // Every substep is like the first: no blade, and what is held stays where it is.
+  // Every substep is like the first: no blade, and held particles stay in place.
   const Setup single = oracles::single_substep_setup(setup, 0);
   const double dt = single.substep_length[0], decay = std::exp(-single.step.damping * dt);
   FrameSolution solution;

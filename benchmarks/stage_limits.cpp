@@ -20,7 +20,7 @@ uint64_t mixed(uint64_t mix, uint64_t with) {
 }  // namespace
 
 Groups groups_of(const Setup& setup, const State& state) {
-  // Lists of holders by what two mixes of them come to: 64 bits tell them apart.
+  // Lists of holders by two mixes of them: 64 bits distinguish them.
   const auto n = at(setup.body.particle_count());
   std::vector<std::pair<uint64_t, int32_t>> holders(n);  // mix, how many
   for (int32_t c = 0; c < state.clusters.count(); ++c) {
@@ -70,7 +70,7 @@ double step_bytes(const Setup& setup, const State& state) {
   const bool contacts = setup.has_blade || !setup.walls.empty() || !setup.grips.empty();
   const bool accelerated = setup.step.acceleration != Acceleration::none;
   // match_shapes. Pair: offset 16. Group: moments 48, mass 16, base 16. Loose particle: position 16, node 4, and its
-  // place in each cluster 4. Cluster: size, body, where its lists are 24, rest sums 48, rotation in and out 72,
+  // place in each cluster 4. Cluster: size, body, places of its lists 24, rest sums 48, rotation in and out 72,
   // placement 48, flag 4.
   const double match = 16 * of.pairs + 80 * of.groups + 20 * of.loose + 4 * of.loose_memberships + 192 * clusters;
   // advance. Pair: offset 16. Group: head 32, base 16, map in and out 96, moments of the prediction in and of the
@@ -81,15 +81,15 @@ double step_bytes(const Setup& setup, const State& state) {
   const double advance = 16 * of.pairs + (288 + (contacts ? 8 : 0) + (accelerated ? 96 : 0)) * of.groups +
                          (68 + (contacts ? 48 : 0) + (accelerated ? (contacts ? 64 : 32) : 0)) * of.loose +
                          4 * of.loose_memberships + (of.loose > 0 ? 72 : 48) * clusters;
-  // begin_substep. Group: head 32, masses 48, map 48, base in and out 32, place and velocity in and out 192, what the
-  // frame began with 96, moments out 96; with contacts rest centre 16, its first displacement and velocity 32, room,
-  // side, resolved and tracked 16. Loose particle: places and count of holders 12, where it was and how it moved 32,
+  // begin_substep. Group: head 32, masses 48, map 48, base in and out 32, place and velocity in and out 192, initial
+  // values of the frame 96, moments out 96; with contacts rest centre 16, its first displacement and velocity 32, room,
+  // side, resolved and tracked 16. Loose particle: places and count of holders 12, place and motion 32,
   // start, predicted and position out 48; with contacts node, pushed and impulse, in and out 68.
   const double substep = (544 + (contacts ? 64 : 0)) * of.groups + (92 + (contacts ? 68 : 0)) * of.loose;
   // begin_first_substep, particle of a group: places 8, displacement and velocity 32; group: head and rest centre 48,
   // mass 16, its first displacement and velocity, place and velocity 128, moments of both 96, base and moments out 112;
-  // with contacts room, side, resolved and tracked 16. Loose particle: as above, but nothing has pushed it: with
-  // contacts node, and pushed out 20.
+  // with contacts room, side, resolved and tracked 16. Loose particle: as above; with contacts node, and pushed
+  // out 20.
   const double first =
       40 * (particles - of.loose) + (400 + (contacts ? 16 : 0)) * of.groups + (92 + (contacts ? 20 : 0)) * of.loose;
   // Once a frame. begin_frame, particle: impulse and death 20. end_step, particle: places 8, displacement and velocity
@@ -104,7 +104,7 @@ double step_bytes(const Setup& setup, const State& state) {
 
 // Detection by distance. Particle: death and node 8, displacement 16, flag out and in 2. Node: its particle 4. By
 // strain, a member of a cluster, in each of two passes: particle 4, node, count of memberships 8, displacement 16; a
-// particle: death 4, flag out and in 2, memberships and where they are 8.
+// particle: death 4, flag out and in 2, memberships and their places 8.
 double detect_bytes(const Setup& setup, const State& state) {
   const auto particles = static_cast<double>(setup.body.particle_count());
   const auto members = static_cast<double>(state.clusters.members.size());
@@ -118,8 +118,8 @@ double detect_bytes(const Setup& setup, const State& state) {
   }
 }
 
-// Skin positions. A vertex is where a particle has no neighbour in a direction: its owner, direction 5, position out
-// 16; owner: displacement 16, node, body, memberships and where they are 16. Cluster that a vertex hangs on: rotation,
+// Skin positions. A vertex lies where a particle has no neighbour in a direction: its owner, direction 5, position out
+// 16; owner: displacement 16, node, body, memberships and their places 16. Cluster that carries a vertex: rotation,
 // rest centre and base, centre out and in 84; its members as detection by strain, once.
 double skin_bytes(const Setup& setup, const State& state) {
   if (!setup.skin.wanted) return 0;

@@ -1,5 +1,5 @@
-// What a frame's stages cannot do without: memory traffic, kernels that wait for one another, and what both take at
-// best (json.md, The limits of stages).
+// Limits of a frame's stages: memory traffic, kernels that wait for one another, and the least time of both (json.md,
+// The limits of stages).
 #pragma once
 #include <array>
 #include <cstdint>
@@ -14,25 +14,24 @@
 namespace cutproof::benchmarks {
 
 struct StageLimit {
-  // That the stage reads and writes, each array counted once for each kernel that uses it, and what the caches keep of
-  // a gathered array counted as if it were all of it. What only cut tissue costs is left out: it has no share that a
-  // body has before it is cut.
+  // Read and written by the stage. Each array counts once for each kernel that uses it; a gathered array counts as if
+  // caches kept all of it. Costs of cut tissue alone are left out: an uncut body does not determine them.
   double bytes = 0;
-  int64_t phases = 0;  // kernels one after the other
+  int64_t phases = 0;  // sequential kernels
 };
 using StageLimits = std::array<StageLimit, kStages.size()>;
 
-// What kernels make of the clusters (gpu/kernels/step/groups.cuh): groups, pairs of a group and a holder, particles
-// that are in no group, and how many clusters have these, counted for each.
+// Groups of the kernels (gpu/kernels/step/groups.cuh): groups, pairs of group and holder, loose particles, and their
+// pairs with holders.
 struct Groups {
   double groups = 0, pairs = 0, loose = 0, loose_memberships = 0;
 };
 Groups groups_of(const Setup& setup, const State& state);
 
-// Of one frame that cuts, on a backend that runs the kernels. Requires a body on a grid.
+// Of one frame that cuts, on a backend with kernels. Requires a body on a grid.
 StageLimits stage_limits(const Setup& setup, const State& state);
 
-// Beside what the machine does at best; `median` [s]: of the stage, absent if it did not run.
+// Beside the machine's limits; `median` [s]: of the stage, absent if it did not run.
 nlohmann::json limit_json(const StageLimit& limit, const MachineLimits& machine, double median);
 
 }  // namespace cutproof::benchmarks

@@ -1,4 +1,4 @@
-// Times that were measured several times over.
+// Repeated measurements of times.
 #pragma once
 #include <chrono>
 #include <cstddef>
@@ -13,10 +13,10 @@ double seconds_since(Clock::time_point begin);
 
 struct Times {
   double median = 0, min = 0, max = 0;  // [s]
-  int64_t count = 0;                    // of samples; 0: nothing was measured
+  int64_t count = 0;                    // of samples; 0: not measured
 };
 Times times_of(std::vector<double> seconds);
-// How long `work` takes, so many times over [s].
+// Times of `work`, so many repetitions [s].
 template <class Work>
 std::vector<double> seconds_of(int repeats, const Work& work) {
   std::vector<double> seconds;
@@ -27,8 +27,8 @@ std::vector<double> seconds_of(int repeats, const Work& work) {
   }
   return seconds;
 }
-// What `measure` gives for each of `count`, all of them in turns, so many times over: what the machine does meanwhile,
-// such as being half as fast for a while, falls on all. [count][repeats]
+// Results of `measure` for each of `count` items, in turns, so many repetitions. So a disturbance, such as a slow phase
+// of the machine, affects all items. [count][repeats]
 template <class Measure>
 std::vector<std::vector<double>> in_turns(int repeats, std::size_t count, const Measure& measure) {
   std::vector<std::vector<double>> measured(count);

@@ -6,7 +6,7 @@ namespace cutproof::benchmarks {
 
 namespace {
 
-// Brings the backend to where the timed frames begin.
+// Runs the backend up to the timed frames.
 void warm_up(Backend& backend, const BenchScene& scene) {
   backend.load({scene.setup}, {scene.state});
   for (int64_t frame = 0; frame < scene.warm_up; ++frame) backend.run(kWholeFrame);
@@ -39,7 +39,7 @@ Timings time_stages(Backend& backend, const BenchScene& scene, int64_t frames, b
   }
   timings.back_to_back = times_of(back_to_back);
 
-  // Last, so that the backend is left where the timed frames end.
+  // Last, so that the backend stays at the end of the timed frames.
   std::array<std::vector<double>, 6> alone;
   for (int64_t repeat = 0; repeat < repeats; ++repeat) {
     warm_up(backend, scene);

@@ -1,4 +1,4 @@
-// How frames and stages are timed.
+// Timing of frames and stages.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -14,21 +14,21 @@ namespace cutproof::benchmarks {
 
 inline constexpr Span kWholeFrame = {Stage::step, Stage::skin};
 
-// What timing one backend on one scene gives. All three passes start from the same state, so they see the same frames.
+// Times of one backend on one scene. All three passes start from the same state, so they see the same frames.
 struct Timings {
   Times frame;                 // whole frames, each waited for
-  Times cutting;               // those of them that removed something
-  Times back_to_back;          // per frame, when the frames are handed over without waiting for any; one per repeat
+  Times cutting;               // those that removed something
+  Times back_to_back;          // per frame, launched without waiting; one per repeat
   std::array<Times, 6> stage;  // spans of one stage; only frames in which the stage ran
 
-  // `frame`, `frame, cutting`, `back to back` where it was timed, and the stages.
+  // `frame`, `frame, cutting`, `back to back` if timed, and the stages.
   std::vector<std::pair<std::string, Times>> named() const;
 };
 // Every pass `repeats` times, each after a warm-up of its own. back_to_back only if `pipelined`, for backends whose
-// run() does not wait. The backend is left where the timed frames end.
+// run() does not wait. Leaves the backend at the end of the timed frames.
 Timings time_stages(Backend& backend, const BenchScene& scene, int64_t frames, bool pipelined, int64_t repeats = 1);
 
-// Memberships that expansion adds in the timed frames. Leaves the backend where these end.
+// Memberships that expansion adds in the timed frames. Leaves the backend at their end.
 int64_t count_added_memberships(Backend& backend, const BenchScene& scene, int64_t frames);
 
 }  // namespace cutproof::benchmarks

@@ -59,7 +59,7 @@ nlohmann::json run_baselines(const BaselinesOptions& options, const Progress& pr
     report.document["particles"] = scene.setup.body.particle_count();
     report.document["spacing"] = scene.setup.body.grid.spacing;
     nlohmann::json row = run_baseline(*backend, baseline, scene);
-    // This method, the first, must leave nothing isolated and all components equal, in every frame.
+    // This method, the first, must isolate nothing and keep components equal in every frame.
     const bool is_ours = &baseline == &baselines().front();
     const bool holds = !is_ours || (row.at("isolated") == 0 && row.at("unequal_frames") == 0);
     report.add(std::move(row), holds);

@@ -74,7 +74,7 @@ CampaignOptions campaign_of(const CampaignsOptions& options, const CampaignKind&
   return campaign;
 }
 
-// So that no campaign pays for what a process does once, on each device: a few cases, each in a load of its own.
+// A few cases on each device, each in a load of its own, so that no campaign pays for a process's first use.
 void warm_up_devices(CampaignOptions campaign, const CampaignRunner& runner) {
   campaign.cases = 4 * campaign.backends;
   campaign.batch = 1;
@@ -82,7 +82,7 @@ void warm_up_devices(CampaignOptions campaign, const CampaignRunner& runner) {
   static_cast<void>(run_campaign(campaign, runner.source, {}));
 }
 
-// What was compared while the time was taken.
+// The comparisons made while time was taken.
 json compared_in(const CampaignOptions& asked, const Campaign& campaign, bool is_the_reference) {
   int64_t checked = 0, inconclusive = 0;
   for (const harness::PropertySummary& property : campaign.properties.all()) {
@@ -134,7 +134,7 @@ json row_of_campaign(const CampaignKind& kind, const CampaignRunner& runner, con
 json run_campaigns(const CampaignsOptions& options, const Progress& progress) {
   const std::vector<CampaignKind> kinds = kinds_of(options);
   std::vector<CampaignRunner> runners = {runner_of(options.backend, options.devices)};
-  // What it is held against comes from the same run.
+  // The comparison comes from the same run.
   if (!runners.front().described->is_the_reference) {
     runners.insert(runners.begin(), runner_of(harness::kReferenceName, ""));
   }

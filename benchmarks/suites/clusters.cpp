@@ -16,16 +16,16 @@ namespace {
 using nlohmann::json;
 
 constexpr const char* kScene = "cluster_growth";
-constexpr int64_t kFewParticles = 3000;  // where nobody wants to wait
-// How much growth is still "about as many clusters as before" at the default τ.
+constexpr int64_t kFewParticles = 3000;  // for a quick run
+// Greatest growth that AFCC's "about as many clusters as before" allows at the default τ.
 constexpr double kWantedGrowth = 0.03;
 
 double change(const std::vector<int64_t>& clusters, int64_t to) {
   return static_cast<double>(to) / static_cast<double>(clusters.front()) - 1;
 }
 
-// Every frame is timed as a whole and then judged: its topology has to be right whatever the number of clusters is.
-// Without a τ nothing is merged.
+// Times and then judges every whole frame: topology must be right for any number of clusters. Without a τ nothing is
+// merged.
 json run_cut(const Contender& contender, std::optional<double> tau, int64_t particles) {
   Scene scene = embedded_scene(kScene);
   if (tau) {

@@ -21,12 +21,12 @@ namespace {
 
 using nlohmann::json;
 
-// What a scene does, stage by stage.
+// A run of a scene, stage by stage.
 struct Looked {
   std::vector<oracles::Pose> poses;                 // at the end of each of its frames
-  std::array<double, kStages.size()> seconds = {};  // in all
-  std::array<int64_t, kStages.size()> ran = {};     // in how many of its frames
-  std::vector<gpu::StepWork> work;                  // of each step; empty if the backend does not tell
+  std::array<double, kStages.size()> seconds = {};  // total
+  std::array<int64_t, kStages.size()> ran = {};     // number of frames with the stage
+  std::vector<gpu::StepWork> work;                  // of each step; empty if the backend does not report it
   std::vector<double> step_seconds;                 // of each step
 };
 Looked look_at(Backend& backend, const PreparedScene& scene, const StopAsked& stop_asked) {
@@ -53,7 +53,7 @@ Looked look_at(Backend& backend, const PreparedScene& scene, const StopAsked& st
   return looked;
 }
 
-// How a run differs from that of the scene as it is.
+// The difference between a run and that of the full scene.
 json error_of_run(const Setup& setup, const Looked& given, const Looked& without) {
   double rms = 0, max = 0;
   int64_t alive_in_one = 0;
@@ -71,7 +71,7 @@ json error_of_run(const Setup& setup, const Looked& given, const Looked& without
           {"same_components", same_components}};
 }
 
-// Means over the steps; null if the backend does not tell.
+// Means over the steps; null if the backend does not report work.
 json work_json(const std::vector<gpu::StepWork>& work) {
   if (work.empty()) return nullptr;
   const auto mean = [&](int64_t gpu::StepWork::*number) {
@@ -86,9 +86,9 @@ json work_json(const std::vector<gpu::StepWork>& work) {
           {"groups", mean(&gpu::StepWork::groups)}};
 }
 
-// What a step takes more for each particle that is resolved, from how its time goes with their number; how many groups
-// and loose particles there are, which a cut changes, is told apart from it. Nothing where more particles are loose
-// than in groups: what these pay at a contact goes with the same number. seconds: of each step, in several runs.
+// The cost of a resolved particle in a step, from the dependence of its time on their number. Numbers of groups and
+// loose particles, which a cut changes, are separate factors. Null where more particles are loose than in groups: the
+// cost of loose ones at a contact depends on the same number. seconds: of each step, in several runs.
 json cost_of_resolved(const std::vector<gpu::StepWork>& work, const std::vector<std::vector<double>>& seconds) {
   int64_t loose = 0, grouped = 0;
   for (const gpu::StepWork& step : work) {
@@ -117,7 +117,7 @@ json stages_json(const Looked& looked, int64_t frames) {
   return stages;
 }
 
-// A scene, and what there is to leave out of it.
+// A scene, and the parts to leave out.
 struct Asked {
   std::string file;
   Scene scene;
@@ -135,15 +135,15 @@ Asked asked_of(const std::string& file, std::optional<int64_t> frames) {
   return asked;
 }
 
-// A run of it as it is, or without one part.
+// A run of the full scene, or without one part.
 struct Variant {
-  std::string part;  // empty: nothing is left out
+  std::string part;  // empty: the full scene
   std::optional<PreparedScene> scene;
-  std::string refused;  // why there is none
+  std::string refused;  // why it cannot run
   Looked looked;
-  std::vector<double> seconds;  // a frame, by turn
+  std::vector<double> seconds;  // per frame, by turn
 };
-// The first is the scene as it is.
+// The first is the full scene.
 std::vector<Variant> look_at_all(Backend& backend, const Asked& asked, const PartsOptions& options) {
   std::vector<Variant> variants(1 + asked.parts.size());
   variants.front().scene.emplace(asked.scene, asked.file, options.frames);
@@ -165,8 +165,8 @@ std::vector<Variant> look_at_all(Backend& backend, const Asked& asked, const Par
   return variants;
 }
 
-// In turns, so that what the machine does meanwhile falls on all of them. Gives the times of the steps of the scene as
-// it is, which hang on single frames, once for each turn.
+// In turns, so that disturbances of the machine affect all variants. Returns, for each turn, the times of the full
+// scene's single steps.
 std::vector<std::vector<double>> time_in_turns(Backend& backend, std::vector<Variant>& variants,
                                                const PartsOptions& options) {
   const Variant& given = variants.front();
@@ -183,7 +183,7 @@ std::vector<std::vector<double>> time_in_turns(Backend& backend, std::vector<Var
   return steps;
 }
 
-// From the middle of its frames on, where a blade is under way.
+// From the middle of its frames on, where a blade is cutting.
 FrameErrors judge_midway(Backend& backend, const PreparedScene& scene) {
   backend.load({scene.setup()}, {scene.start()});
   for (int64_t frame = 0; frame < scene.frame_count() / 2; ++frame) {
@@ -222,7 +222,7 @@ json row_of(const Asked& asked, const Contender& contender, const Variant& given
 json run_parts(const PartsOptions& options, const Progress& progress) {
   const Contender contender = make_contender(options.backend);
   Backend& backend = *contender.instance;
-  // Whatever is wrong with a scene is found out before anything is measured.
+  // Invalid scenes are rejected before any measurement.
   std::vector<Asked> scenes;
   std::size_t rows = 0;
   for (const std::string& file : options.scenes) {

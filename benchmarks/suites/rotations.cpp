@@ -13,7 +13,7 @@ nlohmann::json run_rotations(const RotationsOptions& options, const Progress& pr
                  {"timed", counts.timed},
                  {"repeats", counts.repeats},
                  {"seed", counts.seed},
-                 // Of a suite that is stopped: methods have rows once all are measured.
+                 // A stopped suite has no rows: these follow once all methods are measured.
                  {"methods", nlohmann::json::array()},
                  {"machine_limits", {{"copy_bytes_per_second", copied}}}},
                 progress);

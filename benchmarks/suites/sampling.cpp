@@ -8,7 +8,7 @@ namespace cutproof::benchmarks {
 namespace {
 
 constexpr const char* kKidney = "kidney_101096";
-// What the paper's counts of particles are divided by where nobody wants to wait.
+// Divides AFCC's numbers of particles for a quick run.
 constexpr int64_t kScaledDown = 16;
 
 }  // namespace

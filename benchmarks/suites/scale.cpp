@@ -18,7 +18,7 @@ std::vector<int64_t> sizes_of(const ScaleOptions& options) {
 nlohmann::json run_scale(const ScaleOptions& options, const Progress& progress) {
   const std::vector<int64_t> sizes = sizes_of(options);
   const int64_t frames = options.frames_or_default();
-  // What cannot be made is refused before anything is shown.
+  // Throws for bad options before anything is shown.
   static_cast<void>(make_contender(options.backend));
   const std::size_t rows = sizes.size() * steps_of(options, {}).size();
   static_cast<void>(detection_of(options, {}));

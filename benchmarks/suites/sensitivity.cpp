@@ -71,7 +71,7 @@ json row_of(const ReadyScene& scene, const KeptRun& run, const Disturbance& dist
     }
   }
   std::optional<double> goal = disturbance.goal;
-  // Where correct code is off by nothing, so may nothing else be.
+  // Where correct code has no rounding, no error is allowed.
   if (found.rounding) goal = std::max(kRoundingsAllowed * *found.rounding, kLeastSize);
   if (found.rounding && *found.rounding > 0 && found.least) row["ratio"] = *found.least / *found.rounding;
   if (goal) {
@@ -81,7 +81,7 @@ json row_of(const ReadyScene& scene, const KeptRun& run, const Disturbance& dist
   return row;
 }
 
-// Weight at 45 degrees, where friction 0.5 holds nothing: elsewhere nothing slides.
+// Weight at 45 degrees, where friction 0.5 does not hold; nothing else slides.
 constexpr const char* kSliding = "small_block, sliding";
 constexpr double kAcross = 7;  // [m/s²]
 

@@ -34,7 +34,7 @@ void check(const SolverOptions& options) {
                  "give at least 100, or 0");
 }
 
-// Steps from the state that the backend has, one after the other: what a step costs does not depend on where it begins.
+// Sequential steps from the backend's state: a step's cost does not depend on its start.
 Times time_steps(Backend& backend, int32_t samples) {
   std::vector<double> seconds;
   for (int32_t sample = 0; sample < samples; ++sample) {
@@ -44,8 +44,8 @@ Times time_steps(Backend& backend, int32_t samples) {
   return times_of(seconds);
 }
 
-// One body with one acceleration. Adds rows by iterations: those that were asked for, and the least that comes within
-// the tolerance, which is added to `to_tolerance` too.
+// One body with one acceleration. Adds rows by iterations: the requested ones, and the least within the tolerance,
+// which also goes to `to_tolerance`.
 void measure_curve(Backend& backend, const SolverOptions& options, Setup setup, const State& state,
                    const FrameSolution& solution, json& entry) {
   const std::string acceleration(name_of(setup.step.acceleration));

@@ -21,7 +21,7 @@ namespace {
 
 using nlohmann::json;
 
-// The scenes that are asked for, made one after the other.
+// The requested scenes, made one at a time.
 std::vector<std::function<BenchScene()>> scenes_of(const StagesOptions& options, int64_t frames) {
   std::vector<std::function<BenchScene()>> makers;
   std::vector<Cooking> asked;
@@ -79,7 +79,7 @@ json scene_json(const BenchScene& scene, const Contender& contender, const Measu
   return entry;
 }
 
-// What the stages of a backend that runs the kernels take at best, under the name of each.
+// Least times of a kernel backend's stages, by name.
 std::map<std::string, StageLimit> limits_of(const BenchScene& scene, const Contender& contender) {
   std::map<std::string, StageLimit> limits;
   if (!contender.described->runs_kernels) return limits;
@@ -88,8 +88,8 @@ std::map<std::string, StageLimit> limits_of(const BenchScene& scene, const Conte
   return limits;
 }
 
-// A row for whole frames and for each stage: its time, its error, and its limit. unjudged: what stands for the error of
-// what has not been judged.
+// A row for whole frames and for each stage: its time, its error and its limit. unjudged: replaces the error of rows
+// that are not judged.
 void add_rows(const BenchScene& scene, const Contender& contender, const Measured& measured,
               const MachineLimits& machine, json& document, const char* unjudged = "not measured") {
   const std::map<std::string, StageLimit> limits = limits_of(scene, contender);
@@ -119,7 +119,7 @@ void add_rows(const BenchScene& scene, const Contender& contender, const Measure
 json run_stages(const StagesOptions& options, const Progress& progress) {
   const int64_t frames = options.frames_or_default();
   const auto scenes = scenes_of(options, frames);
-  // What cannot be made or asked for is refused before anything is measured.
+  // Throws for bad options before any measurement.
   static_cast<void>(make_contender(options.backend));
   const std::size_t rows = scenes.size() * steps_of(options, {}).size();
   static_cast<void>(detection_of(options, {}));

@@ -1,5 +1,5 @@
 // The suites of `cutproof bench`: options in, a document out, whose fields docs/reference/schemas/ describes. All throw
-// InputError for options that make no sense, MachineError if the machine fails.
+// InputError for invalid options, MachineError if the machine fails.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -13,33 +13,33 @@
 
 namespace cutproof::benchmarks {
 
-// Whole frames and each stage, a blade cutting: Table 1 of the paper, or boxes and kidneys of given sizes.
+// Whole frames and each stage while a blade cuts: Table 1 of AFCC, or boxes and kidneys of given sizes.
 struct StagesOptions : TimingOptions {
-  std::vector<int64_t> sizes;  // particles; if given, not the scenes
+  std::vector<int64_t> sizes;  // particles; replaces the scenes
   std::vector<std::string> scenes = {"cuboid", "liver", "kidney", "irregular"};
   std::vector<std::string> cooking;  // empty: both of the scenes, boxes of given sizes
-  bool full = false;                 // the scenes at the paper's size
+  bool full = false;                 // scenes at AFCC's size
 };
 nlohmann::json run_stages(const StagesOptions& options, const Progress& progress);
 
-// Table 2 of the paper, a kidney's discontinuous cut at four samplings.
+// Table 2 of AFCC, a kidney's discontinuous cut at four samplings.
 struct SamplingOptions : TimingOptions {
   std::string cooking = "boxes";
-  bool full = false;  // the paper's counts of particles
+  bool full = false;  // AFCC's numbers of particles
 };
 nlohmann::json run_sampling(const SamplingOptions& options, const Progress& progress);
 
-// Fig. 10 of the paper, how the number of clusters changes while a kidney is cut through.
+// Fig. 10 of AFCC, the number of clusters while a kidney is cut through.
 struct ClustersOptions {
   std::string backend = harness::kReferenceName;
-  std::vector<double> taus = {0.25, 0.5, 0.75};  // each a curve, and one without merging
+  std::vector<double> taus = {0.25, 0.5, 0.75};  // a curve each, and one without merging
   std::optional<int64_t> particles;
-  bool full = false;  // the paper's count of particles
+  bool full = false;  // AFCC's number of particles
 };
 inline constexpr int64_t kPaperParticles = 37'704;  // of the scene: the first row of Table 2
 nlohmann::json run_clusters(const ClustersOptions& options, const Progress& progress);
 
-// What a frame takes from a thousand particles to ten million.
+// Times of frames from a thousand particles to ten million.
 struct ScaleOptions : TimingOptions {
   ScaleOptions() { acceleration = {"none", "chebyshev"}; }
   std::vector<int64_t> sizes;  // particles; empty: by backend
@@ -50,11 +50,11 @@ nlohmann::json run_scale(const ScaleOptions& options, const Progress& progress);
 struct RotationsOptions {
   std::string backend = harness::kReferenceName;
   RotationCounts counts;
-  std::optional<int64_t> timed;  // matrices that are timed together; absent: by backend
+  std::optional<int64_t> timed;  // matrices timed together; absent: by backend
 };
 nlohmann::json run_rotations(const RotationsOptions& options, const Progress& progress, const RotationProgress& step);
 
-// What nothing on this machine can be faster than.
+// The machine's limits.
 struct MachineLimitsOptions {
   std::string backend = harness::kReferenceName;
   int repeats = 21;
@@ -98,11 +98,11 @@ struct SensitivityOptions {
 };
 nlohmann::json run_sensitivity(const SensitivityOptions& options, const Progress& progress);
 
-// What each part of a scene costs, and what the scene does without it.
+// The cost of each part of a scene, and the scene without it.
 struct PartsOptions {
   std::string backend = harness::kReferenceName;
   std::vector<std::string> scenes;  // their files
-  std::optional<int64_t> frames;    // of each scene at most
+  std::optional<int64_t> frames;    // most of each scene
   int64_t repeats = 3;
   StopAsked stop_asked = {};  // ends it between two frames
 };
