@@ -1,4 +1,4 @@
-// How far a backend goes from a reference solution, frame by frame.
+// Distances of a backend from a reference solution, frame by frame.
 #pragma once
 #include "model/setup.h"
 #include "model/state.h"
@@ -9,14 +9,14 @@ namespace cutproof::tuning {
 
 class Comparison {
  public:
-  // `allowed`: the RMS distance up to which a frame is within [h]. The distances are noted in `trial`. `setup`,
+  // `allowed`: the greatest RMS distance of a frame within the tolerance [h]. Distances go to `trial`. `setup`,
   // `reference` and `trial` must outlive it.
   Comparison(const Setup& setup, const Trajectory& reference, double allowed, Trial& trial)
       : setup_(setup), reference_(reference), allowed_(allowed), trial_(trial) {}
 
-  // The state at the end of the next frame of the scene.
+  // `state`: at the end of the next frame of the scene.
   void add(const State& state);
-  // A whole run, of which no frame was added.
+  // A whole run, instead of single frames.
   void add(Trajectory run);
   bool beyond() const { return trial_.first_beyond.has_value(); }
   Trajectory& trajectory() { return trajectory_; }

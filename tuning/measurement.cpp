@@ -13,7 +13,7 @@ namespace cutproof::tuning {
 
 namespace {
 
-// Timed runs by which a search with `full` compares what it tries.
+// Timed runs of each trial in a search with `full`.
 constexpr int kSearchRuns = 3;
 
 double seconds_per_frame(Backend& backend, const benchmarks::PreparedScene& scene, const StopAsked& stop_asked) {
@@ -56,7 +56,7 @@ Trial measure(const Measuring& measuring, const ReferenceSolution& reference, co
     throw_if_asked(measuring.asked.stop_asked);
     comparison.add(backend->snapshot().front());
     if (to_the_end) return true;
-    // What is more expensive by its first run may be a little less so by its median.
+    // A first run may be slower than a cheaper median.
     const bool more_expensive = limit && seconds > 1.5 * *limit * static_cast<double>(frames);
     given_up = comparison.beyond() || more_expensive;
     if (given_up) trial.outcome = comparison.beyond() ? Outcome::over : Outcome::more_expensive;
@@ -76,7 +76,7 @@ Trial measure(const Measuring& measuring, const ReferenceSolution& reference, co
     std::vector<double> samples;
     do {
       samples.push_back(seconds_per_frame(*backend, *scene, measuring.asked.stop_asked));
-      // More would only tell more exactly by how much it is no point of the front.
+      // More runs would only refine the cost of a trial that is no point of the front.
       if (measuring.asked.full && !is_given && is_behind(trial, samples.front(), before, measuring.asked.tolerance))
         break;
     } while (static_cast<int>(samples.size()) < most);

@@ -1,4 +1,4 @@
-// What a configuration of a scene costs on a backend, and how far it is from the reference solution.
+// The cost of a configuration on a backend, and its distance from the reference solution.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -17,36 +17,36 @@ namespace cutproof::tuning {
 
 struct TuneOptions {
   std::string scene;                     // its file
-  std::vector<io::SceneChange> changes;  // of it: what is tuned is the scene with these
-  std::string write;                     // where the scene that is found is written
+  std::vector<io::SceneChange> changes;  // of the scene; the changed scene is tuned
+  std::string write;                     // where the found scene is written
   harness::BackendChoice backend;
   double tolerance = 0;                            // [h]
-  ReferenceKind reference = ReferenceKind::limit;  // what errors are distances from
-  std::optional<int64_t> frames;                   // looks at so many of the scene's only
-  bool without_skin = false;                       // nobody looks at it
-  bool full = false;                               // nothing is given up: errors and times of all that is tried
-  int repeats = 3;       // timed runs of a configuration; with `full` of those that may be points of the front
+  ReferenceKind reference = ReferenceKind::limit;  // errors are distances from it
+  std::optional<int64_t> frames;                   // looks at the scene's first frames only
+  bool without_skin = false;                       // it is not needed
+  bool full = false;                               // completes all trials: errors and times
+  int repeats = 3;       // timed runs of a configuration; with `full` of possible points of the front
   StopAsked stop_asked;  // ends it between two frames
 };
 
-// What is measured, and how. `asked` must outlive it.
+// A measurement's subject and method. `asked` must outlive it.
 struct Measuring {
   const TuneOptions& asked;
   Configuration given;
-  fixtures::BuildReport built = {};  // of what was given
+  fixtures::BuildReport built = {};  // of the given scene
 
-  // What is left of the tolerance where the reference solution is not known better.
+  // The tolerance less the reference solution's own error.
   double allowed(const ReferenceSolution& reference) const { return asked.tolerance - reference.known_to_h(); }
   std::unique_ptr<Backend> make_backend() const;
 };
 
-// `limit`: the seconds per frame beyond which it may be given up as too expensive. `before`: what has been measured.
-// With `full` it is timed as often as the search needs; what a front is told from is times_in_turns().
+// `limit`: the seconds per frame beyond which the trial may be given up as too expensive. `before`: earlier trials.
+// With `full` it is timed as often as the search needs; fronts use times_in_turns().
 Trial measure(const Measuring& measuring, const ReferenceSolution& reference, const Configuration& configuration,
               std::optional<double> limit, const std::vector<Trial>& before);
 
-// Seconds per frame of each of them, `repeats` runs in turns with the others; and anew, because the least of many
-// figures is too good.
+// Seconds per frame of each, `repeats` runs in turns with the others. Measured anew, because the least of many figures
+// is biased.
 std::vector<benchmarks::Times> times_in_turns(const Measuring& measuring,
                                               const std::vector<Configuration>& configurations);
 

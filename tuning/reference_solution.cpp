@@ -15,10 +15,10 @@ namespace cutproof::tuning {
 
 namespace {
 
-// What is left, at most, of the error that a substep starts with.
+// Greatest remaining part of a substep's initial error.
 constexpr double kLeft = 1e-4;
 constexpr int32_t kLeastSubsteps = 32, kLeastIterations = 16;
-// Distances up to this are rounding [h].
+// Greatest distance that counts as rounding [h].
 constexpr double kSeen = 1e-9;
 
 // Iterations that shrink every error of a substep to kLeft: with rotations held, each multiplies it by at most
@@ -31,7 +31,7 @@ int32_t enough_iterations(const Scene& scene, int32_t substeps) {
   return static_cast<int32_t>(std::clamp(iterations, 2.0, 1.0 * ReferenceSolution::kMostIterations));
 }
 
-// Of the last two distances, neither may have an event in it.
+// Neither of the last two distances may contain an event.
 bool last_three_remove_the_same(std::span<const RefinementLevel> levels) {
   const auto apart = levels.last(std::min<std::size_t>(2, levels.empty() ? 0 : levels.size() - 1));
   return std::ranges::all_of(apart, [](const RefinementLevel& level) { return level.events.remove_the_same(); });
@@ -78,12 +78,12 @@ std::string known_to(std::span<const RefinementLevel> levels) {
 ReferenceSolution::ReferenceSolution(ReferenceKind kind, const Scene& scene, std::string source,
                                      std::optional<int64_t> frames, double known, StopAsked stop_asked)
     : kind_(kind), scene_(scene), source_(std::move(source)), frames_(frames), stop_asked_(std::move(stop_asked)) {
-  scene_.skin.wanted = false;  // nothing moves with it
+  scene_.skin.wanted = false;  // the skin moves nothing
   scene_.step.acceleration = Acceleration::none;
   setup_ = benchmarks::PreparedScene(scene_, source_, frames_).setup();
-  // The first three are run in any case, because only the third tells how fast they come nearer to each other, and of
-  // the scene's own substeps the one in which each is solved, because it comes last. They know nothing of each other,
-  // so they are run at once: the third takes as long as both others or longer, and the solved one about as long.
+  // The first three always run, because only the third shows the rate of convergence. With the scene's own substeps the
+  // solved level also runs, as it comes last. They are independent, so they run at once: the third takes as long as
+  // both others or longer, and the solved one about as long.
   const RefinementLevel first = level_after(nullptr), second = level_after(&first), third = level_after(&second);
   if (kind_ == ReferenceKind::substeps) solved_ = start(solved_level());
   std::future<Ran> finest = start(third);
@@ -101,7 +101,7 @@ ReferenceSolution::ReferenceSolution(ReferenceKind kind, const Scene& scene, std
     }
     take(next.iterations ? run(next) : solved_.get());
   }
-  // Nothing else is under way when somebody measures times.
+  // No other work may run during measurements of times.
   if (solved_.valid()) solved_.wait();
 }
 
@@ -158,8 +158,7 @@ void ReferenceSolution::take(Ran next) {
   for (std::size_t f = 0; f < std::min(trajectory.frames.size(), trajectory_.frames.size()); ++f) {
     apart = std::max(apart, oracles::poses_apart(setup_, trajectory.frames[f], trajectory_.frames[f]).position.rms());
   }
-  // Refinement levels between which the tissue falls into other parts, or whose blades arrive in other frames, say
-  // nothing about where anything is.
+  // Distances mean nothing between levels whose tissue falls into other parts, or whose blades arrive in other frames.
   if (!difference_in_parts(trajectory, trajectory_).empty() || trajectory.frames.size() != trajectory_.frames.size())
     apart = std::numeric_limits<double>::infinity();
   level.apart_h = apart;

@@ -1,5 +1,5 @@
-// The solution that configurations of a scene are measured against, by the double-precision reference, and how well it
-// is known; with the scene's own substeps at last without the reference's step.
+// The solution from which errors of configurations are measured, by the double-precision reference, and its own error.
+// With the scene's own substeps the last level does without the reference's step.
 #pragma once
 #include <cstdint>
 #include <future>
@@ -17,9 +17,9 @@
 namespace cutproof::tuning {
 
 enum class ReferenceKind {
-  limit,  // of ever shorter time steps, and of iterations that are enough for them
-  // Of ever more iterations, with the scene's own substeps, which are part of the scene; the last level has each of
-  // them solved without iteration (tuning/solved_steps.h), and so does not hang on the reference's step.
+  limit,  // of ever shorter time steps, with enough iterations for each
+  // Of ever more iterations with the scene's own substeps. The last level solves each substep without iteration
+  // (tuning/solved_steps.h), so it does not depend on the reference's step.
   substeps
 };
 
@@ -27,44 +27,45 @@ enum class ReferenceKind {
 struct RefinementLevel {
   int32_t substeps = 0;
   std::optional<int32_t> iterations;  // of the reference; none: each substep is solved
-  std::optional<double> apart_h;      // from the level before: greatest RMS distance in any frame [h]
-  EventsApart events = {};            // from the level before
-  SolvedSteps::Count solved = {};     // where each substep is: how
+  std::optional<double> apart_h;      // greatest RMS distance from the previous level in any frame [h]
+  EventsApart events = {};            // relative to the previous level
+  SolvedSteps::Count solved = {};     // how substeps were solved
 };
 
-// The order of convergence in time that levels k - 2, k - 1 and k show, each with twice the substeps of the one before:
-// the base-2 logarithm of the factor by which distances fell. None: there are not two distances, or one is infinite or
-// no more than rounding (1e-9 h).
+// The order of convergence in time of levels k - 2, k - 1 and k, each with twice the substeps of the previous one. It
+// is the base-2 logarithm of the ratio of distances. None: there are not two distances, or one is infinite or rounding
+// (at most 1e-9 h).
 std::optional<double> observed_order(std::span<const RefinementLevel> levels, std::size_t k);
 
-// By how much the last of these levels may be off [h], as its distances tell. If they fall by a factor r from level to
-// level, all that are still to come add up to the last one over r - 1 (a geometric series; of first order r is 2, and
-// the sum as much as the last one). r is the least that was seen, because one that is greater may be luck; at least the
-// last distance itself counts. Infinity: not known, because some distance did not fall, because there are not two
-// finite ones side by side, or because the last three levels do not remove the same particles in the same frames: a
-// removal that differs is an event, which makes distances of its own and hides how fast the others fall. Distances up
-// to 1e-9 h are rounding, which does not fall: they count as they are.
+// The estimated error of the last of these levels [h]: last distance / (r - 1), the sum of a geometric series if
+// distances fall by a factor r. (First order: r = 2, and the error equals the last distance.) r is the least factor
+// seen, because a greater one may be chance. The estimate is at least the last distance. Distances up to 1e-9 h are
+// rounding, which does not fall: they count as they are.
+//
+// Infinity, that is unknown: some distance did not fall, there are not two adjacent finite ones, or the last three
+// levels do not remove the same particles in the same frames. Such a difference is an event with distances of its own,
+// which hide the convergence.
 double remaining_error(std::span<const RefinementLevel> levels);
-// The same for people: "known to 0.04 h", or "not known", and why.
+// In words: "known to 0.04 h", or "not known" and the reason.
 std::string known_to(std::span<const RefinementLevel> levels);
 
 class ReferenceSolution {
  public:
-  // Refines, a factor of 2 at a time, until the solution is known to `known` [h] or no further level is allowed
-  // (kMostSubsteps, kMostIterations, after which each substep is solved); but the first three are run in any case,
-  // because fewer tell nothing. The scene must have the implicit solver. Here and in refine(): throws Stopped between
-  // two frames once it is asked to stop.
+  // Refines by factors of 2 until the solution is known to `known` [h] or no further level is allowed (kMostSubsteps;
+  // kMostIterations, after which each substep is solved). The first three levels always run, because fewer show no
+  // convergence. The scene must have the implicit solver. Here and in refine(): throws Stopped between two frames if
+  // requested.
   ReferenceSolution(ReferenceKind kind, const Scene& scene, std::string source, std::optional<int64_t> frames,
                     double known, StopAsked stop_asked = {});
 
   const Trajectory& trajectory() const { return trajectory_; }
   const std::vector<RefinementLevel>& levels() const { return levels_; }
-  // By how much the solution may be off [h]; infinity: it is not known.
+  // The solution's estimated error [h]; infinity: unknown.
   double known_to_h() const { return remaining_error(levels_); }
   bool nothing_removed() const;
 
-  // One more level, whatever it costs: what the search has not seen. Of the scene's own substeps it is the one in which
-  // each is solved; after that there is none.
+  // Adds one level, at any cost, that the search has not seen. With the scene's own substeps it is the solved level;
+  // none follows.
   void refine();
 
   static constexpr int32_t kMostSubsteps = 512;    // per frame
@@ -75,9 +76,9 @@ class ReferenceSolution {
     RefinementLevel level;
     Trajectory trajectory;
   };
-  // That which follows `before`; null: the first.
+  // The level after `before`; null: the first.
   RefinementLevel level_after(const RefinementLevel* before) const;
-  // The scene's own substeps, each of them solved.
+  // With the scene's own substeps, each of them solved.
   RefinementLevel solved_level() const;
   bool is_last() const { return !levels_.empty() && !levels_.back().iterations; }
   Ran run(RefinementLevel level) const;
@@ -92,7 +93,7 @@ class ReferenceSolution {
   Setup setup_;
   std::vector<RefinementLevel> levels_;
   Trajectory trajectory_;
-  std::future<Ran> solved_;  // of the scene's own substeps: the last level; declared last, because it uses all above
+  std::future<Ran> solved_;  // the last level, with the scene's own substeps; declared last, because it uses all above
 };
 
 }  // namespace cutproof::tuning

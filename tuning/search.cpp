@@ -23,8 +23,8 @@ class Searcher {
  public:
   Searcher(const SearchSpace& space, const Measure& measure) : space_(space), measure_(measure) {}
 
-  // The index of its trial. Where it was tried before, and given up as too expensive under a limit that can only have
-  // fallen since, or carried through, that trial stands.
+  // The index of the configuration's trial. An earlier trial counts if it was completed, or given up as too expensive:
+  // limits only fall.
   std::size_t attempt(const Configuration& configuration) {
     for (std::size_t t = 0; t < trials_.size(); ++t) {
       if (trials_[t].configuration == configuration) return t;
@@ -40,7 +40,7 @@ class Searcher {
     return index;
   }
 
-  // Of `configuration` with other iterations, the least within the tolerance that are at most `most`; null: none.
+  // The least number of iterations up to `most` with which `configuration` is within the tolerance; null: none.
   std::optional<int32_t> least_iterations(Configuration configuration, int32_t from, int32_t most) {
     int32_t& iterations = configuration.scene.step.iterations;
     int32_t below = from - 1;  // the most that are not enough
@@ -73,8 +73,7 @@ class Searcher {
       configuration.scene.step.substeps = substeps;
       configuration.scene.step.acceleration = Acceleration::none;
       const std::optional<int32_t> plain = least_iterations(configuration, 1, space_.most_iterations);
-      // The first iteration is a plain one, so only two or more can be accelerated; and fewer than the plain ones, or
-      // nothing is gained.
+      // The first iteration is plain, so acceleration needs at least two. It pays only with fewer than the plain ones.
       const int32_t most = plain ? *plain - 1 : space_.most_iterations;
       if (most < 2) continue;
       configuration.scene.step.acceleration = Acceleration::chebyshev;
@@ -87,7 +86,7 @@ class Searcher {
       Configuration configuration = given;
       configuration.scene.step.acceleration = acceleration;
       for (const int32_t iterations : substeps_to_try(1, space_.most_iterations)) {
-        if (acceleration == Acceleration::chebyshev && iterations < 2) continue;  // the first is a plain one
+        if (acceleration == Acceleration::chebyshev && iterations < 2) continue;  // the first is plain
         configuration.scene.step.iterations = iterations;
         const Trial& trial = trials_[attempt(configuration)];
         if (trial.outcome == Outcome::refused || trial.outcome == Outcome::schedule) break;
@@ -155,7 +154,7 @@ class Searcher {
 
  private:
   static bool helps(const Trial& fewer, const Trial& more) {
-    if (!fewer.first_beyond) return true;  // it was not the error
+    if (!fewer.first_beyond) return true;  // the error was not the reason
     const std::size_t frame = *fewer.first_beyond;
     return more.rms_h.size() > frame && more.rms_h[frame] < (1 - kHelps) * fewer.rms_h[frame];
   }
@@ -191,7 +190,7 @@ std::vector<std::size_t> by_cost(const std::vector<Trial>& trials) {
 
 namespace {
 
-// Only these are compared at all (trial.h).
+// Only these are compared (trial.h).
 bool is_comparable(const Trial& trial) { return trial.outcome == Outcome::within || trial.outcome == Outcome::over; }
 
 }  // namespace

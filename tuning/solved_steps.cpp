@@ -48,7 +48,7 @@ void SolvedSteps::step(const Setup& setup, State& state) {
     count_.by_iteration += answer.by == oracles::SolvedBy::iteration;
     count_.unsolved += !answer.converged;
     const double dt = single.substep_length.front(), decay = std::exp(-setup.step.damping * dt);
-    Vec3 pushed;  // what contacts and grips have done: all else leaves Σ m x where x~ has it
+    Vec3 pushed;  // push of contacts and grips: nothing else changes Σ m x of x~
     for (std::size_t i = 0; i < state.x.size(); ++i) {
       if (state.alive[i] == 0) continue;
       const Vec3 moved = answer.x[i] - state.x[i];

@@ -1,4 +1,4 @@
-// A simulator whose substeps are not iterated: each is where it comes to rest
+// A simulator that solves substeps without iteration: each ends at its fixed point
 // (oracles/comparison/reference_solution.h). All other stages are the reference's.
 #pragma once
 #include <cstdint>
@@ -23,10 +23,10 @@ class SolvedSteps final : public Backend {
 
   struct Count {
     int64_t substeps = 0;
-    int64_t by_iteration = 0;  // of them by plain iterations, because nothing else led there
-    int64_t unsolved = 0;      // of those not even by these
+    int64_t by_iteration = 0;  // by plain iterations, because every other method failed
+    int64_t unsolved = 0;      // not even by these
   };
-  const Count& count() const { return count_; }  // since it was made
+  const Count& count() const { return count_; }  // since construction
 
  private:
   void step(const Setup& setup, State& state);

@@ -29,7 +29,7 @@ EventsApart events_apart(const Trajectory& expected, const Trajectory& actual) {
   EventsApart apart;
   const std::size_t frames = std::min(expected.frames.size(), actual.frames.size());
   if (frames == 0) return apart;
-  // The first frame at whose end a particle is gone; as many as there are frames: none.
+  // The first frame at whose end a particle is gone; the number of frames: none.
   const auto gone_at = [&](const Trajectory& trajectory) {
     std::vector<std::size_t> gone(trajectory.frames.front().alive.size(), frames);
     for (std::size_t f = frames; f-- > 0;) {

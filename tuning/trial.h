@@ -1,4 +1,4 @@
-// One configuration of a scene that was tried, and what came of it.
+// A tried configuration, and its result.
 #pragma once
 #include <cstdint>
 #include <nlohmann/json.hpp>
@@ -15,8 +15,7 @@ struct Configuration {
   Scene scene;
   friend bool operator==(const Configuration&, const Configuration&) = default;
 };
-// What differs from `given` apart from substeps, iterations and acceleration, as a person would write it; empty:
-// nothing.
+// Differences from `given` other than substeps, iterations and acceleration, in words; empty: none.
 std::string differences(const Configuration& configuration, const Configuration& given);
 
 enum class Outcome {
@@ -30,17 +29,17 @@ enum class Outcome {
 inline constexpr const char* kOutcomeNames[] = {"within", "over", "topology", "schedule", "refused", "more_expensive"};
 constexpr const char* name_of(Outcome outcome) { return kOutcomeNames[static_cast<std::size_t>(outcome)]; }
 
-// One configuration that was tried.
+// A tried configuration.
 struct Trial {
   Configuration configuration;
   Outcome outcome = Outcome::over;
-  // RMS distance from the reference solution at the end of each frame of the scene [h], up to the frame in which it was
-  // given up; what is not a number is infinite.
+  // RMS distance from the reference solution at the end of each frame of the scene [h], until it was given up; NaN is
+  // infinite here.
   std::vector<double> rms_h;
   double greatest_rms_h = 0, greatest_h = 0;  // over these frames [h]
-  std::optional<std::size_t> first_beyond;    // the first of them that is beyond the tolerance
-  int64_t removed_otherwise = 0;  // particles that only this or only the reference solution has, in the last of them
-  std::string why;                // what a table says about a trial that is not within
+  std::optional<std::size_t> first_beyond;    // the first of them beyond the tolerance
+  int64_t removed_otherwise = 0;  // particles that only this or only the reference solution has, in the last frame
+  std::string why;                // remark in a table about a trial that is not within
   benchmarks::Times frame;        // seconds per frame of the scene; no samples if it was given up
 };
 // The fields of docs/reference/schemas/tune.json.

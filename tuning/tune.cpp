@@ -21,10 +21,10 @@ namespace {
 
 using nlohmann::json;
 
-// The reference solution is refined until this part of the tolerance is left for what is not known of it, if it can be.
+// The reference solution is refined, if possible, until its error is this part of the tolerance.
 constexpr double kUnknownShare = 0.25;
 
-// Whatever is wrong with the choice of a backend, or with the scene, is found out here.
+// Throws for a bad choice of backend and for a bad scene.
 Measuring prepare(const TuneOptions& options) {
   Measuring measuring{options, {io::read_scene(options.scene, options.changes)}};
   const Scene& scene = measuring.given.scene;
@@ -48,7 +48,7 @@ Measuring prepare(const TuneOptions& options) {
   return measuring;
 }
 
-// An eighth of the limit's finest level at most: what has as many as that level would be compared with itself.
+// At most an eighth of the limit's finest level, whose number would be compared with itself.
 std::vector<int32_t> searched_substeps(int32_t given) {
   return substeps_to_try(given, std::max(ReferenceSolution::kMostSubsteps / 8, given));
 }
@@ -64,13 +64,13 @@ SearchSpace space_of(const Measuring& measuring, const TuneOptions& options, con
     space.followed_to = std::max(kFrontTolerances.back() - reference.known_to_h(), kFrontTolerances.back() / 2);
   }
   space.may_resize = !scene.expect.clusters.has_value();
-  // A scene that counts the skin's shells looks at it.
+  // An expectation of the skin's shells needs the skin.
   space.may_drop_skin = options.without_skin && !scene.expect.shells_at_end;
   return space;
 }
 
-// All that may be points of the front, in turns. What their times show may bring others into question; then all of them
-// once more, because a round of those alone would be another while.
+// Times all possible points of the front in turns. Their times may make others possible points. Then all are timed
+// again, because a round of the new ones alone would have other conditions.
 void time_front(const Measuring& measuring, std::vector<Trial>& trials) {
   std::set<std::size_t> timed;
   while (true) {
@@ -86,7 +86,7 @@ void time_front(const Measuring& measuring, std::vector<Trial>& trials) {
   }
 }
 
-// A trial that was verified, as the scene that would be written.
+// A verified trial, as the scene to be written.
 struct Found {
   std::size_t trial = 0;
   std::string text;
@@ -96,8 +96,8 @@ struct Found {
 
 using JudgedRuns = std::map<std::size_t, JudgedRun>;  // by trial
 
-// Refines the reference solution. Meanwhile what is asked of it first is judged, which knows nothing of it: what was
-// given, and the cheapest.
+// Refines the reference solution. Meanwhile judges the runs that are verified first, the given scene and the cheapest,
+// which do not depend on it.
 JudgedRuns judge_while_refining(const Measuring& measuring, ReferenceSolution& reference,
                                 const std::vector<Trial>& trials) {
   std::map<std::size_t, std::future<JudgedRun>> judging;
@@ -113,8 +113,8 @@ JudgedRuns judge_while_refining(const Measuring& measuring, ReferenceSolution& r
   return judged;
 }
 
-// The cheapest that holds when it is verified and, timed again, is still cheaper than what was given. `judged`: runs of
-// those that have been judged before.
+// The cheapest trial that holds in verification and, timed again, is still cheaper than the given scene. `judged`:
+// earlier judged runs.
 std::optional<Found> take_cheapest(const Measuring& measuring, const ReferenceSolution& reference,
                                    const std::vector<Trial>& trials, JudgedRuns judged,
                                    const std::function<void(std::size_t, const std::string&)>& leave) {
@@ -190,12 +190,12 @@ json front_json(const std::vector<FrontPoint>& points) {
 }  // namespace
 
 double part_searched(const json& so_far, const Scene& given) {
-  // Substeps rise, with and without acceleration; then what is cheapest is varied, which takes about as long as a fifth
-  // of that.
+  // Substeps ascend, with and without acceleration. Then the cheapest is varied, which takes about a fifth of that
+  // time.
   constexpr double kOfSteps = 0.85;
   const std::vector<int32_t> substeps = searched_substeps(given.step.substeps);
   const json& trials = so_far.at("trials");
-  if (trials.size() < 2) return 0;  // the scene as it is given
+  if (trials.size() < 2) return 0;  // the given scene
   const json& last = trials.back();
   const auto at = std::lower_bound(substeps.begin(), substeps.end(), last.at("substeps").get<int32_t>());
   const double half = last.at("acceleration") == "none" ? 0.25 : 0.75;
@@ -233,7 +233,7 @@ bool run_tune(const TuneOptions& options, const TuneProgress& progress) {
     show(TuneStep::reference_known);
     if (!(measuring.allowed(reference) > 0)) return conclude(TuneStep::reference_unknown);
 
-    std::vector<Trial> trials;  // here and not by what search() gives back: they are needed while it goes on
+    std::vector<Trial> trials;  // outside search(), because they are needed during the search
     search(measuring.given, space_of(measuring, options, reference),
            [&](const Configuration& configuration, std::optional<double> limit) {
              trials.push_back(measure(measuring, reference, configuration, limit, trials));

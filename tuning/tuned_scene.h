@@ -1,4 +1,4 @@
-// The scene that was found, as a file.
+// The found scene, as a file.
 #pragma once
 #include <string>
 
@@ -6,8 +6,8 @@
 
 namespace cutproof::tuning {
 
-// A mesh that the scene names is named from where the new scene lies. `source`: the file of the given scene; `path`:
-// where the new one will be written.
+// Paths of meshes are relative to the new scene's place. `source`: the file of the given scene; `path`: where the new
+// one will be written.
 std::string tuned_scene_text(const Configuration& configuration, const std::string& source, const std::string& path);
 
 }  // namespace cutproof::tuning

@@ -21,7 +21,7 @@ JudgedRun judged_run(const Measuring& measuring, const Configuration& configurat
   const benchmarks::PreparedScene prepared(scene, path, measuring.asked.frames);
   run.setup = prepared.setup();
   harness::FrameRunner runner(*backend, {prepared.setup()}, {prepared.start()});
-  // What a scene expects is of all of it; but isolation that it expects fails no verdict in a part of it either.
+  // Expectations refer to the whole scene, but expected isolation also fails no verdict in a part of it.
   Expectations expected = scene.expect;
   if (measuring.asked.frames) {
     expected = {};

@@ -1,4 +1,4 @@
-// Whether the scene that is written holds: read back from its text and run by a fresh backend.
+// Verifies the written scene: read back from its text and run by a fresh backend.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -7,13 +7,13 @@
 
 namespace cutproof::tuning {
 
-// A run of it that is looked at by every oracle and by every expectation of the scene.
+// A run of it with every oracle and every expectation of the scene.
 struct JudgedRun {
   Configuration configuration;
   std::string text;  // the scene's
   Setup setup;
   Trajectory trajectory;
-  int64_t verdicts = 0;  // that were asked for
+  int64_t verdicts = 0;  // checked
   std::string failure;   // of a verdict; empty: all hold
 };
 // `path`: where the scene will be written.
@@ -21,10 +21,10 @@ JudgedRun judged_run(const Measuring& measuring, const Configuration& configurat
 
 struct Verified {
   Trial trial;           // without times
-  int64_t verdicts = 0;  // that were asked for
+  int64_t verdicts = 0;  // checked
   std::string failure;   // empty: it holds
 };
-// What was judged, and how far it is from a reference solution that the search has not seen.
+// The judged run, and its distance from a reference solution that the search has not seen.
 Verified verify(const Measuring& measuring, const ReferenceSolution& reference, JudgedRun run);
 
 }  // namespace cutproof::tuning
