@@ -147,10 +147,9 @@ DetectParameters detection_of(const TimingOptions& options, const DetectParamete
   const auto known = choice_named<RemovedEnds>(options.remove);
   require_option(known.has_value(), "--remove", fmt::format("there is no '{}' of the ends of an edge", options.remove),
                  fmt::format("use {}", fmt::join(names_of(RemovedEnds{}), " or ")));
-  require_option(
-      *known == RemovedEnds::both || own.criterion == Criterion::distance, "--remove",
-      fmt::format("the criterion of a scene is {}, which asks particles, and not edges", name_of(own.criterion)),
-      "leave it out, or leave that scene out with --scenes");
+  require_option(*known == RemovedEnds::both || own.criterion == Criterion::distance, "--remove",
+                 fmt::format("a scene's criterion is {}, which judges particles, not edges", name_of(own.criterion)),
+                 "leave it out, or leave that scene out with --scenes");
   detect.remove = *known;
   return detect;
 }

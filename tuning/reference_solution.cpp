@@ -71,7 +71,7 @@ std::string known_to(std::span<const RefinementLevel> levels) {
     return "not known: between its levels tissue falls into other parts, or the blade arrives in another frame";
   }
   return last_three_remove_the_same(levels)
-             ? "not known: its levels do not come nearer to each other each time"
+             ? "not known: distances between its levels do not keep falling"
              : "not known: its last three levels do not remove the same particles in the same frames";
 }
 

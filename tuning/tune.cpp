@@ -30,8 +30,7 @@ Measuring prepare(const TuneOptions& options) {
   const Scene& scene = measuring.given.scene;
   if (scene.step.solver != Solver::implicit) {
     throw InputError(options.scene, "step.solver",
-                     "'published' has no solution that it comes closer to: its stiffness depends on the number of "
-                     "iterations and substeps",
+                     "'published' has no solution to converge to: its stiffness depends on iterations and substeps",
                      "use \"implicit\" with a stiffness");
   }
   if (!std::isfinite(options.tolerance)) {
@@ -41,7 +40,7 @@ Measuring prepare(const TuneOptions& options) {
   static_cast<void>(harness::make_backend(options.backend));
   const benchmarks::PreparedScene prepared(scene, options.scene, options.frames);
   if (prepared.frame_count() == 0) {
-    throw InputError(options.scene, "frame.count", "the scene has no frame, so nothing happens that could be compared",
+    throw InputError(options.scene, "frame.count", "the scene has no frame to compare",
                      "give a number of frames, a blade, or a grip that ends");
   }
   measuring.built = prepared.report();
@@ -134,7 +133,7 @@ std::optional<Found> take_cheapest(const Measuring& measuring, const ReferenceSo
   for (const std::size_t index : by_cost(trials)) {
     if (index == 0) {
       if (given) break;
-      leave(index, "it is not within when it is verified");
+      leave(index, "verification rejects it");
       continue;
     }
     Found found = verified(index);
@@ -146,7 +145,7 @@ std::optional<Found> take_cheapest(const Measuring& measuring, const ReferenceSo
     found.as_given = times[0];
     found.tuned = times[1];
     if (given && found.tuned.median > (1 - kCheaper) * found.as_given.median) {
-      leave(index, "timed again it is no cheaper than what was given");
+      leave(index, "timed again it is no cheaper than the given scene");
       continue;
     }
     return found;

@@ -80,7 +80,7 @@ json run_cut(const Contender& contender, std::optional<double> tau, int64_t part
 json run_clusters(const ClustersOptions& options, const Progress& progress) {
   std::vector<std::optional<double>> taus(options.taus.begin(), options.taus.end());
   for (const double tau : options.taus) {
-    require_option(tau > 0 && tau <= 1000, "--tau", fmt::format("{} is no fraction of the median size", tau),
+    require_option(tau > 0 && tau <= 1000, "--tau", fmt::format("{} is no valid fraction of the median size", tau),
                    "give numbers above 0, such as 0.25,0.5,0.75");
   }
   taus.emplace_back();
