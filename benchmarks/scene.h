@@ -31,8 +31,8 @@ inline constexpr int64_t kJudgedFrames = 4;
 // `boxes` or `sampled`; throws InputError, naming --clusters, for anything else.
 Cooking cooking_of(const std::string& name);
 
-// AFCC's sampled clusters and its expansion: as many balls as it has clusters (795 of 101,096 particles; ours 789 of
-// 101,056). They do not cover every edge, because a ball's seed may lie next to another ball.
+// The paper's sampled clusters and its expansion: as many balls as it has clusters (795 of 101,096 particles; ours 789
+// of 101,056). They do not cover every edge, because a ball's seed may lie next to another ball.
 void sample_as_paper(Scene& spec);
 
 // A box up to kLargestBox particles, a larger body is a kidney; 4 substeps × 4 plain iterations; k = 1e5. The blade

@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
-# Runs a command in a clone of HEAD on a bare Debian: a fresh root folder of debootstrap (minbase) in which only git is
-# installed. Shows that a machine that has nothing else suffices. Prints the times, and exits as the command does.
+# Runs a command in a clone of HEAD on a bare Debian: a fresh root folder by debootstrap (minbase) with git as the only
+# addition. Shows that such a machine suffices. Prints the times, and exits as the command does.
 # Usage: ci/bare.sh [--keep] [--suite NAME] [--with PATH] COMMAND...
 #   e.g. ci/bare.sh ci/test.sh; ci/bare.sh --suite trixie --with dist ci/demo.sh
-#   --keep         leaves the root folder behind, and prints where it is
+#   --keep         keeps the root folder, and prints its path
 #   --suite NAME   Debian's name of the release (default: bookworm, which is Debian 12)
-#   --with PATH    what git ignores, and goes into the clone: packages
-# CUTPROOF_BARE_CACHE: a folder in which the root folder is kept as an archive before the clone, for the next time.
-# TMPDIR: where the root folder is made (default: /var/tmp); ci/test.sh needs 10 GB there.
-# Needs root and debootstrap. Debian's packages come from where this machine has them.
+#   --with PATH    also copies a path that git ignores, such as packages, into the clone
+# CUTPROOF_BARE_CACHE: a folder that keeps the root folder, as it is before the clone, as an archive for later runs.
+# TMPDIR: parent of the root folder (default: /var/tmp); ci/test.sh needs 10 GB there.
+# Needs root and debootstrap. Packages come from this machine's Debian repositories.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 refuse() { echo "ci/bare.sh: $1" >&2; exit 2; }
@@ -32,7 +32,7 @@ for tool in debootstrap unshare git; do
 done
 [ -z "$(git status --porcelain)" ] || echo "ci/bare.sh: changes that are not committed are left out" >&2
 
-# Repositories of this machine that are Debian's; its keys are in the root folder, too.
+# This machine's Debian repositories; the root folder has Debian's keys, too.
 repositories=$(apt-get indextargets --format '$(ORIGIN) $(REPO_URI) $(RELEASE)' 'Created-By: Packages' 2>/dev/null |
   awk -v suite="$suite" '$1 == "Debian" && $3 ~ "^" suite { print "deb", $2, $3, "main" }' | sort -u)
 mirror=$(awk -v suite="$suite" '$3 == suite { print $2; exit }' <<< "$repositories")
@@ -43,7 +43,7 @@ fi
 
 root=$(mktemp -d "${TMPDIR:-/var/tmp}/cutproof_bare_XXXXXX")
 job=
-# Mounts are made by the job, in a namespace that ends with it: nothing outside the folder can be removed here.
+# The job makes mounts in a namespace that ends with it, so this can remove nothing outside the folder.
 finish() {
   [ -z "$job" ] || { kill -KILL "$job" && wait "$job"; } 2>/dev/null || true
   if [ "$keep" = yes ]; then echo "ci/bare.sh: kept: $root"; else rm -rf --one-file-system "$root"; fi
@@ -51,7 +51,7 @@ finish() {
 trap finish EXIT
 trap 'exit 130' INT
 trap 'exit 143' TERM
-# Waits for a command that SIGINT does not reach, and whose processes end with it, whatever they do.
+# Waits for a command that SIGINT does not reach, and whose processes all end with it.
 set -m
 run() {
   unshare --mount --pid --fork --kill-child "$@" < /dev/null &
@@ -80,12 +80,12 @@ chmod 755 "$root"
 echo "$repositories" > "$root/etc/apt/sources.list"
 apt-config dump Acquire | grep -iE '^Acquire::[a-z]+::Proxy(::|-| )' > "$root/etc/apt/apt.conf.d/90proxy" || true
 cp -L /etc/resolv.conf "$root/etc/resolv.conf"
-rm -f "$root/etc/hosts"  # so that nothing may count on names
+rm -f "$root/etc/hosts"  # so that nothing can depend on names
 git -c safe.directory="$PWD" clone -q --no-local "file://$PWD" "$root/root/cutproof"
 [ -z "$with" ] || cp -a --parents "$with" "$root/root/cutproof/"
 made=$((SECONDS - begin))
 
-# Nothing of this shell gets in but how the network is reached.
+# Only this shell's network settings are passed on.
 surroundings=(HOME=/root PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin LANG=C.UTF-8)
 for name in http_proxy https_proxy no_proxy HTTP_PROXY HTTPS_PROXY NO_PROXY; do
   [ -z "${!name:-}" ] || surroundings+=("$name=${!name}")

@@ -1,11 +1,10 @@
 #!/usr/bin/env python3
 """Checks that the folders of the project include each other one way: no circle.
 
-Usage: check_folders.py [--draw] [ROOT]   --draw: also prints what each folder includes, from the ground up
+Usage: check_folders.py [--draw] [ROOT]   --draw: also prints the includes of each folder, from the ground up
        check_folders.py --self-test       whether a circle is found
 
-A folder is one that has sources in it; what lies in a folder below is of that folder. Exit status: 0 there is no circle,
-1 there is one, 2 bad usage.
+Only folders with sources count; a subfolder is a folder of its own. Exit status: 0 no circle, 1 a circle, 2 bad usage.
 """
 import argparse
 import graphlib

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Prints which tests were skipped or left out, which kernels no device has run yet, and as the last line the counts.
+"""Prints skipped and omitted tests, kernels that no device has run yet, and in the last line the counts.
 
 Usage: count_tests.py REPORT STATUS GPU
 
-REPORT is CTest's JUnit file, STATUS CTest's exit status, GPU what `cutproof info` says of the backend gpu. Exits 1 if a
+REPORT is CTest's JUnit file, STATUS CTest's exit status, GPU the text of `cutproof info` about the backend gpu. Exits 1 if a
 test failed or none ran.
 """
 import os
@@ -19,7 +19,7 @@ COMMIT = re.compile(r'"commit": ?"([0-9a-f]+)"')
 
 
 def kernels_since_the_last_run():
-    """The kernel sources that differ from those of the newest commit of which a run on a device is stored."""
+    """Kernel sources that differ from those of the newest commit with a stored run on a device."""
     def git(*arguments):
         return subprocess.run(["git", "-C", RESULTS, *arguments], capture_output=True, text=True).stdout.split()
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Dissects a kidney with every check on, and leaves a recording and a page. Installs the package that lies in dist/
-# (ci/package.sh); without one, installs what is missing and builds the program.
+# Dissects a kidney with every check on, and leaves a recording and a page. Installs the package in dist/
+# (ci/package.sh); without one, installs missing packages and builds the program.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -15,7 +15,7 @@ if [ -n "$package" ]; then
   program=/usr/bin/cutproof
 else
   ci/install.sh
-  # A folder of its own, without what a demonstration does not run: tests, benchmarks, the GPU.
+  # A folder of its own, without parts that a demonstration does not run: tests, benchmarks, the GPU.
   cmake --preset demo >/dev/null
   cmake --build build/demo --target cutproof
   program=build/demo/cli/cutproof

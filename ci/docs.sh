@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
-# Makes pages of the public headers, with a search, in one folder that a browser opens from disk: index.html. Exits 1
-# and prints what Doxygen warns of, if it does.
-# Usage: ci/docs.sh [FOLDER]     (default: build/api; what is there is replaced)
+# Makes pages of the public headers, with a search, in a folder that a browser opens from disk: index.html. Exits 1 and
+# prints Doxygen's warnings, if there are any.
+# Usage: ci/docs.sh [FOLDER]   (default: build/api; its contents are replaced)
 # Needs Doxygen: ci/install.sh docs
 set -euo pipefail
 cd "$(dirname "$0")/.."
 folder=${1:-build/api}
 command -v doxygen > /dev/null || { echo "ci/docs.sh: Doxygen is not installed: ci/install.sh docs" >&2; exit 77; }
 
-# What cmake --install installs (cmake/Install.cmake, guests/include/CMakeLists.txt).
+# Headers that cmake --install installs (cmake/Install.cmake, guests/include/CMakeLists.txt).
 version=$(sed -n 's/^project(cutproof VERSION \([0-9.]*\).*/\1/p' CMakeLists.txt)
 rm -rf "$folder"
 mkdir -p "$folder"

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Prints a header with its comments as Doxygen reads them. Usage: doxygen_comments.py FILE      (ci/docs.sh)
 
-The first comment describes the file, one on lines of its own the declaration below it, one after code that code.
+The first comment describes the file, a comment on lines of its own the next declaration, a trailing comment its line.
 Comments are plain text: no command of Doxygen, and no markup but `code`.
 """
 import re
@@ -22,7 +22,7 @@ def begin_of_comment(line):
 
 
 def declares(code):
-    """A member, an argument or an enumerator, which a comment behind it describes."""
+    """A member, an argument or an enumerator with a trailing comment."""
     return code.endswith((";", ",")) and not code.lstrip().startswith("{") or re.fullmatch(r"\s*\w+( = [^{}]*)?", code)
 
 
@@ -42,7 +42,7 @@ def converted(lines):
         code, text = line[:at].rstrip(), line[at + 2:]
         text, end, rest = text.partition("*/") if line[at + 1] == "*" else (text, "", "")
         in_block = line[at + 1] == "*" and not end
-        if re.match(r"\S.*{$", code) and not in_block:  # of what begins here
+        if re.match(r"\S.*{$", code) and not in_block:  # of the block that begins here
             yield f"/** {as_text(text.strip())} */"
             yield code
         elif code and not declares(code):
@@ -60,7 +60,7 @@ def converted(lines):
 
 def main():
     text = open(sys.argv[1], encoding="utf-8").read()
-    if "struct fmt::" in text:  # Doxygen wants to know the namespace
+    if "struct fmt::" in text:  # Doxygen needs the namespace
         print("namespace fmt {}")
     print("\n".join(converted(text.splitlines())))
 

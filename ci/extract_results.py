@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes small documents in results/ of what tables need of many or large ones. Each says what it leaves out.
+"""Extracts from many or large documents the small ones in results/ that tables need. Each names its omissions.
 
 Usage: extract_results.py fronts TUNE.json...      of `cutproof tune SCENE --full --backend gpu --json`
        extract_results.py lockstep RUN.json...     of `cutproof run SCENE --backend host --against reference --mode lockstep`
@@ -9,7 +9,7 @@ Usage: extract_results.py fronts TUNE.json...      of `cutproof tune SCENE --ful
                                                    several sizes
        extract_results.py baselines BENCH.json...  of `cutproof bench baselines --backend gpu --particles N --seed S`
        extract_results.py solver RUN.json...       of `cutproof run SCENE --backend gpu --errors solver --error-frames 10000`
-       extract_results.py isolation TEXT           of what `isolation_sweep --bodies 6000 --seed 1` prints
+       extract_results.py isolation TEXT           of the output of `isolation_sweep --bodies 6000 --seed 1`
 Then ci/results.sh makes the tables.
 """
 import json

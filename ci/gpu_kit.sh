@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Packs what a GPU machine needs that has nothing but a driver: programs, their libraries, scenes, regressions, run.sh.
+# Packs everything for a GPU machine with only a driver: programs, their libraries, scenes, regressions, run.sh.
 # Usage: ci/gpu_kit.sh [BUILD] [KIT]     BUILD: a build folder configured with the gpu backend (default build/default),
 #                                        which this builds; KIT: the folder to make (default gpu_kit)
 # On that machine: KIT/run.sh RESULTS    unpacks KIT/contents.tar.gz into KIT the first time, and writes JSON and logs into
@@ -8,13 +8,13 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 build=${1:-build/default}
 kit=${2:-gpu_kit}
-most_bytes=60000000  # as much as can be sent to such a machine beside the code
+most_bytes=60000000  # most that can be sent to such a machine beside the code
 
 programs=(cli/cutproof cli/cutproof-guest tests/gpu/launch_device_test tests/gpu/device_failures_test tests/gpu/kernels_test
   property_tests/property_tests)
 [ -f "$build/CMakeCache.txt" ] || { echo "ci/gpu_kit.sh: $build is no build folder: cmake --preset default -B $build first" >&2; exit 2; }
-# The programs look for their libraries beside themselves, and for those that these need as well (a runpath, which is
-# what linkers write nowadays, does not count for those).
+# Programs look beside themselves for their libraries and for those of the libraries. (A runpath, the linkers' default,
+# does not apply to the latter.)
 cmake -B "$build" -DCMAKE_BUILD_RPATH='$ORIGIN/../lib' -DCMAKE_EXE_LINKER_FLAGS=-Wl,--disable-new-dtags > /dev/null
 grep -q '^CMAKE_CUDA_COMPILER:.*nvcc' "$build/CMakeCache.txt" ||
   { echo "ci/gpu_kit.sh: $build has no gpu backend: it needs a CUDA toolkit" >&2; exit 2; }
@@ -26,14 +26,14 @@ mkdir -p "$kit.new/bin" "$kit.new/lib" "$kit.new/fixtures" "$kit.new/guests"
 for guest in "${guests[@]}"; do install -s "$build/guests/examples/$guest.so" "$kit.new/guests/"; done
 for program in "${programs[@]}"; do
   install -s "$build/$program" "$kit.new/bin/"
-  # The C library and the driver are the machine's own.
+  # The machine has its own C library and driver.
   ldd "$build/$program" | awk '$3 ~ /^\// {print $3}' | grep -vE '/(libc|libm|libpthread|libdl|librt|ld-linux[^/]*|libcuda|libresolv)\.so'
 done | sort -u | while read -r library; do
   install -s "$(readlink -f "$library")" "$kit.new/lib/${library##*/}"
 done
 cp -r fixtures/scenes fixtures/regressions "$kit.new/fixtures/"
 rm -rf "$kit.new/fixtures/regressions/inputs"  # of readers, which need no GPU
-# kidney_discontinuous at rest for long enough to make 1,000 frames of it.
+# kidney_discontinuous with a rest long enough for 1,000 frames.
 python3 - "$kit.new/fixtures/scenes" <<'PYTHON'
 import json, sys
 folder = sys.argv[1]

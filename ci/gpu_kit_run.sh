@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Runs all that needs a GPU: primitives, failing calls, scenes, properties, compute-sanitizer, timings. Part of the kit
-# that ci/gpu_kit.sh makes. Usage: run.sh RESULTS [PART...]
+# from ci/gpu_kit.sh. Usage: run.sh RESULTS [PART...]
 # Parts: primitives failures scenes lockstep determinism properties guests sanitizer timings
 set -uo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
@@ -27,20 +27,20 @@ try() {  # NAME COMMAND...
   local name=$1 begin=$SECONDS result=0
   shift
   "$@" > "$results/$name.log" 2>&1 || result=$?
-  # Here is a device, so a test that skips itself has not been run.
+  # This machine has a device, so a skipped test is a failure.
   if [ "$result" = 0 ] && grep -q '^\[  SKIPPED \]' "$results/$name.log"; then result=4; fi
   [ "$result" = 0 ] || tail -25 "$results/$name.log"
   note "$name" "$result" "$((SECONDS - begin))"
 }
 
-# Holds if the command says that something does not.
+# Passes if the command reports a failing verdict.
 finds() {
   local result=0
   "$@" || result=$?
   [ "$result" = 1 ]
 }
-# A guest under compute-sanitizer: TOOL PLUGIN SUMMARY, which is what the tool's last line has to say. The judge starts
-# whatever CUTPROOF_GUEST names.
+# A guest under compute-sanitizer: TOOL PLUGIN SUMMARY, the required last line of the tool. The judge starts the program
+# that CUTPROOF_GUEST names.
 judge_under() {
   printf '#!/usr/bin/env bash\nexec compute-sanitizer --tool %s --error-exitcode 99 --log-file %s "%s/bin/cutproof-guest" "$@"\n' \
     "$1" "$work/$1.log" "$here" > "$work/guest"
@@ -66,7 +66,7 @@ for part in $parts; do
         try "lockstep_$scene" cutproof run "fixtures/scenes/$scene.json" --backend gpu --against reference --json "$results/lockstep_$scene.json"
       done ;;
     determinism)
-      # The same run gives the same files, byte for byte, so two runs are compared by their recordings.
+      # The same run gives the same files in all bytes, so comparing recordings compares runs.
       for run in first second; do
         try "determinism_$run" cutproof run fixtures/scenes/kidney_1000_frames.json --backend gpu --record "$work/$run"
       done
@@ -83,11 +83,11 @@ for part in $parts; do
       for plugin in cuda_components cuda_components_in_a_block; do
         try "judge_$plugin" cutproof judge "guests/$plugin.so" --save "$results" --json "$results/judge_$plugin.json"
       done
-      # Twenty turns of Müller's method are not always enough, and a barrier that is missing shows.
+      # Twenty iterations of Müller's method are not always enough, and a missing barrier shows.
       for plugin in cuda_rotations cuda_components_without_barrier; do
         try "judge_$plugin" finds cutproof judge "guests/$plugin.so" --save "$results" --json "$results/judge_$plugin.json"
       done
-      # Not of the one without a barrier: all it shares it reads and writes atomically, which is no hazard to racecheck.
+      # Without the plugin that lacks a barrier: its shared accesses are atomic, no hazard to racecheck.
       for plugin in cuda_components cuda_components_in_a_block cuda_rotations; do
         for tool in memcheck racecheck synccheck initcheck; do
           try "judge_${plugin}_$tool" judge_under "$tool" "$plugin" 'ERROR SUMMARY: 0 errors\|RACECHECK SUMMARY: 0 hazards'
@@ -95,8 +95,8 @@ for part in $parts; do
       done ;;
     sanitizer)
       for tool in memcheck racecheck initcheck synccheck; do
-        # One by one and not as a graph: racecheck does not know conditional nodes. From one thread: it ends no kernel
-        # while another is being launched.
+        # Kernels one by one, because racecheck does not support conditional nodes. From one thread, because racecheck
+        # then ends no kernel during the launch of another.
         try "sanitizer_$tool" compute-sanitizer --tool "$tool" --error-exitcode 9 cutproof fuzz \
           --backend gpu-eager --threads 1 --cases "${CUTPROOF_SANITIZER_CASES:-128}" --save "$results"
         try "sanitizer_${tool}_step" compute-sanitizer --tool "$tool" --error-exitcode 9 cutproof run \
@@ -104,7 +104,7 @@ for part in $parts; do
         try "sanitizer_${tool}_retarded" compute-sanitizer --tool "$tool" --error-exitcode 9 cutproof run \
           fixtures/scenes/small_block.json --backend gpu-eager --set step.retardation=0.004 --frames 30
       done
-      # The graph as well, by those that get through its conditions, which they do with nothing else on the device.
+      # The graph too, with tools that support its conditions; they do so only when nothing else runs on the device.
       for tool in memcheck initcheck; do
         for scene in small_block kidney_discontinuous cluster_growth; do
           try "sanitizer_${tool}_graph_$scene" compute-sanitizer --tool "$tool" --error-exitcode 9 cutproof run \
@@ -125,7 +125,7 @@ for part in $parts; do
       try baselines cutproof bench baselines --backend gpu --json "$results/baselines.json"
       try parts cutproof bench parts --backend gpu --json "$results/parts.json"
       try campaigns cutproof bench campaigns --backend gpu --json "$results/campaigns.json"
-      # A body of ten million particles for 100 frames, a blade cutting.
+      # A body of ten million particles under a blade for 100 frames.
       try ten_million cutproof bench stages --backend gpu --sizes 10000000 --frames 100 --json "$results/stages_10M.json" ;;
     *) echo "run.sh: there is no part '$part'" >&2; exit 2 ;;
   esac

@@ -1,10 +1,9 @@
 #!/usr/bin/env bash
-# Feeds arbitrary bytes to every reader of files: libFuzzer with ASan and UBSan, one target after the other. The last
-# lines are a table; the exit status is 1 if anything was found. What to do then: docs/design/architecture.md, Input
-# fuzzing.
+# Feeds arbitrary bytes to every reader of files: libFuzzer with ASan and UBSan, one target at a time. The last lines
+# are a table; the exit status is 1 if anything was found. Next steps: docs/design/architecture.md, Input fuzzing.
 # Usage: ci/input_fuzzing.sh [SECONDS_PER_TARGET] [TARGET...]     default: 600, all targets
-# CUTPROOF_FUZZING_SEED: libFuzzer's seed (default 1). build/fuzzing/corpus keeps what was learnt, so a further run
-# goes on from there; remove it to begin again.
+# CUTPROOF_FUZZING_SEED: libFuzzer's seed (default 1). build/fuzzing/corpus keeps the corpus for later runs; remove it
+# to begin anew.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 seconds=${1:-600}
@@ -24,7 +23,7 @@ build=build/fuzzing
 cmake --build "$build" --target input_fuzzer
 fuzzer=$build/tests/input_fuzzing/input_fuzzer
 
-# Readers take files: thousands of them a second, which belong into memory.
+# Readers take files, thousands of them a second; they are kept in memory.
 memory=/dev/shm
 [ -w "$memory" ] || memory=${TMPDIR:-/tmp}
 TMPDIR=$(mktemp -d "$memory/cutproof_fuzzing_XXXXXX")
@@ -45,7 +44,8 @@ for target in "${targets[@]}"; do
   [ -d "$regressions" ] && folders+=("$regressions")
   words=()
   [ -s "$seeds.dict" ] && words=(-dict="$seeds.dict")
-  # HDF5 keeps what it frees, which looks like a leak after every input; the replay under ASan looks for leaks at its end.
+  # HDF5 keeps freed memory, which looks like a leak after every input. The replay under ASan checks for leaks at its
+  # end.
   leaks=1
   [[ $target == recording* || $target == arrays || $target == run ]] && leaks=0
   limits=(-detect_leaks="$leaks" -max_len="${longest[$target]}" -rss_limit_mb=2048 -malloc_limit_mb=1024 -timeout=20)
@@ -63,7 +63,7 @@ for target in "${targets[@]}"; do
     [ -e "$finding" ] || continue
     found=$((found + 1))
     grep -aE -m 8 'ERROR:|what\(\)|runtime error|SUMMARY' "$log" || tail -20 "$log"
-    # Time-outs and memory are not made smaller: each try would take as long, or as much.
+    # Time-outs and excess memory are not minimised: each try would take as long, or as much.
     small=$findings/minimised
     case $finding in
       */timeout-* | */oom-*) cp "$finding" "$small" ;;
@@ -73,7 +73,7 @@ for target in "${targets[@]}"; do
     [ -e "$small" ] || cp "$finding" "$small"
     echo "found: $small; keep it as $regressions/NAME_OF_THE_FAULT when it is mended"
   done
-  # The fuzzer itself may fail, without an input that is to blame.
+  # The fuzzer itself may fail without a guilty input.
   [ "$result" = 0 ] || [ "$found" -gt 0 ] || { found=1; tail -20 "$log"; }
   [ "$found" = 0 ] || status=1
 

@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# Installs the packages of Debian 12 that the program needs to be built, and those of each group that is named. Does
-# nothing if all of them are installed.
+# Installs the Debian 12 packages that building the program needs, and those of each named group. Does nothing if all
+# are installed.
 # Usage: ci/install.sh [--list] [GROUP...]
-#   tests       what the tests need; those that need a browser or VTK are skipped without that group
+#   tests       for the tests; without the next two groups tests of a browser or VTK are skipped
 #   browser     Chromium, in which tests/report/ opens report pages
-#   libraries   VTK, which tests/guests/libraries_test.cpp judges, and packages of npm, which javascript_test.py does
-#   package     what ci/package.sh needs
-#   fuzzing     what ci/input_fuzzing.sh needs beside the tests
-#   docs        Doxygen, with which ci/docs.sh makes API pages
+#   libraries   VTK, which tests/guests/libraries_test.cpp judges, and npm packages, which javascript_test.py judges
+#   package     for ci/package.sh
+#   fuzzing     for ci/input_fuzzing.sh, beside the tests'
+#   docs        Doxygen for ci/docs.sh
 #   --list      prints the packages instead
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -18,7 +18,7 @@ program=(
   nlohmann-json3-dev libfmt-dev libcli11-dev
   python3 esbuild libjs-three  # report pages
 )
-package=(dpkg-dev file libgfortran-12-dev)  # what a package depends on; the archive that libblas.a needs
+package=(dpkg-dev file libgfortran-12-dev)  # a package's dependencies; the archive that libblas.a needs
 tests=(
   "${package[@]}" git ccache
   libgtest-dev libgmock-dev librapidcheck-dev
@@ -32,7 +32,7 @@ tests=(
 browser=(chromium chromium-driver python3-selenium)
 libraries=(libvtk9.1)
 command -v npm >/dev/null || libraries+=(nodejs npm)  # a Node.js from elsewhere brings its own npm
-fuzzing=(clang libclang-rt-dev llvm)  # llvm adds file and line to the reports of sanitizers
+fuzzing=(clang libclang-rt-dev llvm)  # llvm adds file and line to sanitizers' reports
 docs=(doxygen)
 
 list=no
@@ -57,7 +57,7 @@ missing=()
 for name in "${packages[@]}"; do
   dpkg-query -W -f='${Status}' "$name" 2>/dev/null | grep -q 'install ok installed' || missing+=("$name")
 done
-# libvtk9-dev would bring 212 packages, a Java and an MPI among them. Its headers are enough, beside the libraries.
+# libvtk9-dev would bring 212 packages, with Java and MPI. Its headers and the libraries suffice.
 headers=no
 [[ " $* " != *" libraries "* ]] || [ -d build/libraries/usr/include/vtk-9.1 ] || headers=yes
 engines() {

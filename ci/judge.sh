@@ -1,11 +1,10 @@
 #!/usr/bin/env bash
-# A subcommand of cutproof in continuous integration: leaves results.json, junit.xml, page.html and, of fuzz and judge, the
-# counterexamples (cases/, unless --save names a folder) in a folder. Ends as the program does (0: everything holds, 1:
-# something fails, 2: bad input, 3: the machine failed).
+# Runs a subcommand of cutproof in continuous integration. Leaves results.json, junit.xml and page.html in a folder;
+# fuzz and judge also leave counterexamples (cases/, unless --save names a folder). Exits as the program does (0:
+# everything holds, 1: something fails, 2: bad input, 3: the machine failed).
 # Usage: judge.sh PACKAGE FOLDER SUBCOMMAND ARGUMENTS...     e.g. judge.sh cutproof-0.1.0-linux-x86_64.tar.gz found check RUN
-#   PACKAGE     the .tar.gz of ci/package.sh, which is unpacked into FOLDER/program unless it is there; "-": the program
-#               that is installed
-#   SUBCOMMAND  run, check, judge or fuzz, which write all three; others have --json and --junit themselves
+#   PACKAGE     the .tar.gz of ci/package.sh, unpacked into FOLDER/program if that is missing; "-": the installed program
+#   SUBCOMMAND  run, check, judge or fuzz, which write all three; others take --json and --junit as arguments
 set -euo pipefail
 
 refuse() { echo "judge.sh: $1" >&2; exit 2; }

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Which of the long tests a commit runs. ci/test.sh runs a share of them, ci/nightly.sh all.
+"""Chooses the long tests that a commit runs. ci/test.sh runs a share of them, ci/nightly.sh all.
 
-Usage: long_tests.py BUILD    the first line is a pattern of those that are left out (ctest -E), the second for a person
+Usage: long_tests.py BUILD    prints a pattern of the omitted tests (ctest -E), then a line for a person
 
-The commit's hash chooses every SHARE-th. Each row says what no shorter test
-finds. Every mutant is expected to be found by a test that is none of them. Outside a repository all are run.
+The commit's hash chooses every SHARE-th. Each row names a find that no shorter test makes. Other tests should find every
+mutant. Outside a repository all are run.
 """
 import json
 import pathlib
@@ -55,7 +55,7 @@ def main():
         sys.exit(__doc__)
     listed = subprocess.run(["ctest", "--test-dir", sys.argv[1], "--show-only=json-v1"], check=True,
                             capture_output=True)
-    # The name of a test with a parameter goes on with its value, in words.
+    # The name of a parameterised test continues with its value, in words.
     names = [test["name"].partition("  #")[0] for test in json.loads(listed.stdout)["tests"]]
     long_tests = [name for pattern, _ in LONG for name in names if re.fullmatch(pattern, name)]
     commit = subprocess.run(["git", "-C", pathlib.Path(__file__).parent, "rev-parse", "--short=12", "HEAD"],

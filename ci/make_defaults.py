@@ -2,8 +2,8 @@
 """Writes the tables of defaults and constants into docs/design/method.md, from the schema of scenes (a test holds it
 against the table of fields in the code) and from the constants in the code.
 
-Usage: make_defaults.py [--check]     --check: writes nothing, and says whether the page is up to date
-Exit status: 0 up to date or written, 1 out of date, 2 a constant is not where it was.
+Usage: make_defaults.py [--check]     --check: writes nothing, and reports whether the page is up to date
+Exit status: 0 up to date or written, 1 out of date, 2 a constant is missing.
 """
 import json
 import pathlib
@@ -13,9 +13,9 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs/design/method.md"
 BEGIN, END = "<!-- defaults: begin -->\n", "<!-- defaults: end -->\n"
-# Of no consequence for what is simulated.
+# Irrelevant to the simulation.
 OTHERS = re.compile(r"\$schema|version|name|description|body\.(?:origin|mesh)|expect")
-# Value, file, pattern and the requirement that uses it. A group of the pattern is a number of C++.
+# Value, file, pattern and the requirement that uses it. The pattern's groups are C++ numbers.
 CONSTANTS = [
     ("clearance of the blade, factor", "model/setup.h", r"return (1\.\d+) \* \(setup\.blade\.thickness", "M3.8"),
     ("most turns of blade and walls", "reference_cpu/contacts.cpp", r"kMostTurns = (\S+);", "M3.11"),

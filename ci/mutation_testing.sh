@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Mutation testing: applies mutants to a copy of the code and asks the gate to find each (ci/mutation_testing/run.py).
 # Usage: ci/mutation_testing.sh [OPTION...]     options of run.py
-# CUTPROOF_COPIES=N: N parts side by side, each in a copy of the build; makes the table of them. Needs root.
+# CUTPROOF_COPIES=N: N parts in parallel, each in a copy of the build; makes their table. Needs root.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 ci/install.sh tests
@@ -15,7 +15,7 @@ parts=()
 for ((i = 1; i <= copies; ++i)); do
   parts+=("${work}_$i.json")
   rm -f "${work}_$i.json"
-  # A build knows where it lies, so each copy takes the place of the first, for those who run in it.
+  # A build contains its own path, so each copy is mounted in place of the first for its own processes.
   unshare --mount bash -c 'rm -rf "$1_$2" && cp -a "$1" "$1_$2" && mount --bind "$1_$2" "$1" && exec python3 ci/mutation_testing/run.py "${@:3}"' \
     part "$work" "$i" --shard "$i/$copies" --jobs $(($(nproc) / copies + 1)) --json "${work}_$i.json" "$@" &
 done

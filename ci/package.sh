@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Builds the program and the libraries, and packs them: a .tar.gz and a .deb, each with its SHA-256, and a wheel. Their
-# program needs glibc 2.34 or later, and nothing else.
+# Builds and packs the program and the libraries: a .tar.gz and a .deb, each with its SHA-256, and a wheel. The packed
+# program needs only glibc 2.34 or later.
 # Usage: ci/package.sh [OPTIONS of cmake]     e.g. -DCUTPROOF_CUDA=ON, with the gpu backend
-# CUTPROOF_DIST: where the packages go, and nothing else stays (default: dist)
+# CUTPROOF_DIST: the packages' folder, which keeps nothing else (default: dist)
 set -euo pipefail
 cd "$(dirname "$0")/.."
 dist=${CUTPROOF_DIST:-$PWD/dist}

@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
-"""Checks that the build and the tests use nothing but what ci/install.sh installs, on a Debian 12.
+"""Checks that the build and the tests use only packages that ci/install.sh installs, on a Debian 12.
 
 Usage: packages.py BUILD               every file that the build in this folder has read, the programs that it calls, the
-                                       Python modules that tests import; and what the program cutproof alone needs, by the
-                                       packages that are listed for it
-       packages.py BUILD --self-test   that a file of no package, a package that is not listed, and a program that tests
-                                       must not see are found
+                                       Python modules that tests import; and the program cutproof alone, against its own
+                                       list of packages
+       packages.py BUILD --self-test   whether it finds a file of no package, a package missing in the lists, and a
+                                       program that tests must not see
        packages.py --path FOLDER       prints a PATH for tests: FOLDER, with a link to each program of these packages. So a
                                        test that calls another program fails here as it would on a bare machine
-These packages: those that ci/install.sh lists for the program and the tests, all that they depend on, and what every
-Debian has (essential or required packages, and apt). Exit status: 0 all is as it should be, 1 something is not, 77 this
-is no Debian 12, where packages have other names (--path prints the PATH as it is).
+These packages: those that ci/install.sh lists for the program and the tests, their dependencies, and those of every
+Debian (essential or required packages, and apt). Exit status: 0 nothing is missing, 1 something is, 77 this is no
+Debian 12, so packages have other names (--path prints the unchanged PATH).
 """
 import argparse
 import ast
@@ -28,7 +28,7 @@ GROUPS = ("tests", "browser", "docs")
 PYTHON = "/usr/bin/python3"
 MERGED = {"/bin": "/usr/bin", "/sbin": "/usr/sbin", "/lib": "/usr/lib", "/lib32": "/usr/lib32", "/lib64": "/usr/lib64"}
 ALTERNATIVES = "/etc/alternatives/"
-TESTS = ("tests", "property_tests", "ci", "docs", "guests/python")  # where programs and modules are named
+TESTS = ("tests", "property_tests", "ci", "docs", "guests/python")  # places that name programs and modules
 
 
 def output(*command, **more):
@@ -41,7 +41,7 @@ def is_debian_12():
 
 
 def alternatives():
-    """By the name of each alternative, master or slave: the files that it may stand for."""
+    """By the name of each alternative, master or slave: its possible targets."""
     choices = {}
     for file in pathlib.Path("/var/lib/dpkg/alternatives").glob("*"):
         lines = iter(file.read_text().splitlines()[2:])
@@ -72,7 +72,7 @@ def steps(path):
         target = os.readlink(link)
         if link not in MERGED:
             seen.append(link)
-        if target.startswith(ALTERNATIVES):  # decided by what it may stand for
+        if target.startswith(ALTERNATIVES):  # each target that it may have decides
             return [*seen, target]
         place = "/" if target.startswith("/") else place
         rest = [name for name in target.split("/") if name] + rest
@@ -80,8 +80,8 @@ def steps(path):
 
 
 class Packages:
-    """What is installed here, and what would be on a bare machine: `listed` and all that it depends on."""
-    owners = {}  # of each file that dpkg was asked about
+    """The installed packages, and those of a bare machine: `listed` and their dependencies."""
+    owners = {}  # of each file in a query to dpkg
 
     def __init__(self, listed):
         fields = ("Package", "Essential", "Priority", "db:Status-Status", "Pre-Depends", "Depends", "Provides")
@@ -103,13 +103,13 @@ class Packages:
             if name in self.closed or name not in self.needs:
                 continue
             self.closed.add(name)
-            for choice in self.needs[name]:  # apt takes the first; of a virtual one, what is here
+            for choice in self.needs[name]:  # apt takes the first; of a virtual one, the installed one
                 here = (one if one in self.needs else providers.get(one, [None])[0] for one in choice)
                 new.append(next(filter(None, here), name))
         self.choices = alternatives()
 
     def ask(self, paths):
-        """Asks dpkg who owns these paths and what they lead to, all at once."""
+        """Asks dpkg for the owners of these paths and of their targets, all at once."""
         names = set()
         for path in paths:
             for step in steps(path):
@@ -131,8 +131,7 @@ class Packages:
                     self.owners[forms[form]].update(one.split(":")[0] for one in owners.split(", "))
 
     def why_not(self, path):
-        """Why a path would not be there on a bare machine: None if it would, else the package (or "no package") and the
-        file. After ask()."""
+        """The package (or "no package") and the file that a path would miss on a bare machine, or None. After ask()."""
         for step in steps(path):
             if step.startswith(ALTERNATIVES):
                 reasons = [self.why_not(choice) for choice in self.choices.get(step[len(ALTERNATIVES):], ())]
@@ -145,7 +144,7 @@ class Packages:
 
 
 class Build:
-    """What a build made by Ninja has read, by the way in which it did: {path: who}."""
+    """The files that a Ninja build has read: {path: how}."""
 
     def __init__(self, folder):
         self.folder = folder.resolve()
@@ -192,7 +191,7 @@ class Build:
         return {path: who for path, who in read.items() if path.startswith("/") and os.path.isfile(path)}
 
     def left_out(self):
-        """Where files need no package, by name."""
+        """Places whose files need no package, by name."""
         source = pathlib.Path(self.cache["CMAKE_HOME_DIRECTORY"])
         rules = [("the source tree", source), ("the build folder", self.folder),
                  ("VTK's headers, as ci/install.sh unpacks them", source / "build/libraries"),
@@ -242,7 +241,7 @@ sys.__stdout__.write("\\nFILES\\n" + "\\n".join(files))
 
 
 def check(packages, build, used):
-    """What is used and would be missing on a bare machine: {package: [(file, who uses it)]}."""
+    """Used files that would be missing on a bare machine: {package: [(file, who uses it)]}."""
     left_out = build.left_out()
     asked = {path: who for path, who in used.items()
              if not any(path == place or path.startswith(f"{place}/") for place in left_out)}

@@ -5,8 +5,8 @@ Usage: results.py                writes every table between `<!-- results: NAME 
        results.py --check        whether pages and documents agree; writes nothing
        results.py --self-test    whether --check finds a changed figure, a missing table and a document not cited
 
---check further asks that every document is cited by a page or read by a table or a picture, that every cited document
-exists, and that all of them together have 2 MB at most. Exit status: 0 yes, 1 no, 2 bad usage or a missing document.
+--check also requires that a page cites each document, or that a table or a picture reads it; that every cited document
+exists; and that all together have 2 MB at most. Exit status: 0 yes, 1 no, 2 bad usage or a missing document.
 """
 import argparse
 import json
@@ -26,7 +26,7 @@ TORN = 3  # h; a Hausdorff distance beyond this means that tissue tore elsewhere
 
 
 class Documents:
-    """The stored results, each read once; `read` says which."""
+    """The stored results, each read once; `read` has those."""
 
     def __init__(self, root):
         self.folder = root / "results"
@@ -80,7 +80,7 @@ def table(head, rows):
 # --- README.md -------------------------------------------------------------------------------------------------------
 
 def inconclusive(campaign):
-    """How many comparisons of the step again rounding left open, of what it checked."""
+    """Inconclusive comparisons of the step, as a part of those checked."""
     for one in campaign["properties"]:
         if one["property"] == "admissible step" and one.get("inconclusive"):
             return f"; {percent(one['inconclusive'], one['checked'])} of *admissible step* inconclusive"
@@ -163,7 +163,7 @@ def fig_10(read):
 
 
 def sizes(read):
-    """Frames of a cut, plain and accelerated, and those of the paper's kidneys beside its own."""
+    """Frames of a cut, plain and accelerated; frames of the paper's kidneys beside its own times."""
     rows = []
     for name in ("h200_stages_rooms", "h200_stages_10M_one_condition", "h200_stages_sampled_traced"):
         document, found = read(name), {}
@@ -240,7 +240,7 @@ def levels_of(document):
 
 
 def known_to(document):
-    """As tuning/reference_solution.cpp says it, whose rule is younger than some documents."""
+    """As in tuning/reference_solution.cpp, whose rule is newer than some documents."""
     levels = document["reference"]["levels"]
     apart = [level["apart_h"] for level in levels[1:]]
     same = all(level["alive_in_one"] == level["removed_in_another_frame"] == 0 for level in levels[-2:])
@@ -323,7 +323,7 @@ def geometry(read):
 
 
 def cut_faces(read):
-    """Skin beside the blade's path; what of both ends stands halfway, and each rule fitted."""
+    """Distance of the skin from the blade's path: both ends placed halfway, and each rule fitted."""
     found = {(row["scene"], row["remove"], row["fit_cuts"]): row for row in read("cpu_cut_faces_host")["rows"]}
     columns = (("both", False), ("both", True), ("one", True), ("nearer", True))
     scenes = [scene for scene in CUT_SCENES if (scene, "nearer", True) in found]
@@ -376,7 +376,7 @@ def isolation(read):
 
 
 def claims(read):
-    """What the paper claims, what its own tables say, and what was measured."""
+    """The paper's claims, its own tables, and our measurements."""
     frames = {row["scene"]: row["paper_seconds"] for row in read("h200_table_1")["rows"] if row["what"] == "frame"}
     sums = {scene: 0 for scene in ("cuboid", "liver", "kidney")}
     for row in read("h200_table_1")["rows"]:
@@ -447,14 +447,14 @@ def mutants_alone(read):
 TABLES = {of.__name__: of for of in (status, table_1, fig_10, sizes, errors, single_steps, solver, rotations, retardation, front, cut_faces,
                                      geometry, baselines, sensitivity, claims, isolation, cuda_plugins, mutants_by_finder,
                                      mutants_alone)}
-# Documents that only pictures are made of: docs/images/make.
+# Documents that only pictures use: docs/images/make.
 OF_PICTURES = {"h200_front_kidney_arc", "h200_front_small_block", "h200_front_cuboid_press", "h200_front_liver_cut"}
 
 
 # --- The command -----------------------------------------------------------------------------------------------------
 
 def made(text, read):
-    """The text with each table as the documents have it, and the names of these tables."""
+    """The text with each table made from the documents, and the names of these tables."""
     names = []
 
     def again(marked):

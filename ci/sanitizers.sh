@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Every test under AddressSanitizer and UndefinedBehaviorSanitizer, then the same under ThreadSanitizer; and the program
-# with each file compiled by itself, which finds includes that are missing, and linked as a whole, where two definitions
-# of one class are an error (odr).
+# Every test under AddressSanitizer and UndefinedBehaviorSanitizer, then under ThreadSanitizer. Then the program twice:
+# with each file compiled alone, which finds missing includes, and linked as a whole, where two definitions of one class
+# are an error (odr).
 # Usage: ci/sanitizers.sh [asan] [tsan] [odr]     default: all
 set -euo pipefail
 cd "$(dirname "$0")/.."

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs what is missing, builds, runs every test, and of the long ones a share that the commit chooses
+# Installs missing packages, builds, and runs every test, of the long ones a share that the commit chooses
 # (ci/long_tests.py). The last line is "N passed, N failed, N skipped".
 # CUTPROOF_WHOLE=1: all of the long ones, eight times as many random cases, kernels for every GPU,
 # and API pages by Doxygen (ci/nightly.sh).
@@ -14,7 +14,7 @@ docs=()
 ci/install.sh tests browser "${docs[@]}"
 werror=()
 [ "${CI:-}" = true ] && werror=(-DCUTPROOF_WERROR=ON)
-# Where no GPU can run them, kernels are compiled for one kind alone, as fast as that goes.
+# Without a GPU kernels are compiled for one architecture only, as fast as possible.
 kernels=(-UCMAKE_CUDA_ARCHITECTURES)
 if [ "${CUTPROOF_WHOLE:-}" != 1 ]; then
   export CUTPROOF_CASES=${CUTPROOF_CASES:-250}
@@ -39,9 +39,9 @@ if [ "${CUTPROOF_WHOLE:-}" != 1 ]; then
   left_out=(-E "${share%%$'\n'*}")
   long=${share#*$'\n'}
 fi
-# Where GitHub runs this, what tests provoke is no finding about this project.
+# On GitHub, provoked messages of tests are not findings about this project.
 unset GITHUB_ACTIONS GITHUB_STEP_SUMMARY
-# One test more than there are cores: some wait for a browser or a clock.
+# One test more than cores: some wait for a browser or a clock.
 ctest --test-dir "$build" --output-on-failure --no-tests=error "${left_out[@]}" -j "$(($(nproc) + 1))" --output-junit "$PWD/$report" || status=$?
 [ -s "$report" ] || { echo "no test was run"; echo "0 passed, 1 failed, 0 skipped"; exit 1; }
 echo "$long"

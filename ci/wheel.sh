@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes a wheel of the .tar.gz that lies in a folder beside it: cutproof.py, cutproof_run.py, program, scenes, headers for
-# plugins. Its platform is the oldest manylinux that the program needs, or linux if it needs more than glibc (PEP 600).
+# Makes a wheel from the .tar.gz in the same folder: cutproof.py, cutproof_run.py, program, scenes, headers for plugins.
+# Its platform is the oldest manylinux that suffices, or linux if it needs more than glibc (PEP 600).
 # Usage: ci/wheel.sh [FOLDER]     default: dist
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -48,10 +48,10 @@ def main(folder):
         tag = f"py3-none-{platform([top / name for name in PROGRAMS], machine)}"
         wheel = folder / f"cutproof-{version}-{tag}.whl"
         info, data = f"cutproof-{version}.dist-info", f"cutproof-{version}.data"
-        files = []  # names, contents, whether they are run
+        files = []  # names, contents, executable or not
         for path in sorted(top.rglob("*")):
             name = path.relative_to(top).as_posix()
-            # Libraries are for CMake; of headers a plugin needs those of its own.
+            # Libraries are for CMake; a plugin needs only the plugin headers.
             if not path.is_file() or name.startswith("lib/") or re.match(r"include/cutproof/\w+/", name):
                 continue
             place = (path.name if name in PYTHON_FILES else f"{data}/scripts/cutproof" if name == PROGRAMS[0]
@@ -73,7 +73,7 @@ Provides-Extra: hdf5
     record = "".join(f"{place},sha256={base64.urlsafe_b64encode(hashlib.sha256(contents).digest()).rstrip(b'=').decode()},"
                      f"{len(contents)}\n" for place, contents, _ in files)
     files.append((f"{info}/RECORD", f"{record}{info}/RECORD,,\n".encode(), False))
-    # Of no time: the same archive gives the same wheel.
+    # Without times: the same archive gives the same wheel.
     with zipfile.ZipFile(wheel, "w", zipfile.ZIP_DEFLATED) as archive:
         for place, contents, is_run in files:
             entry = zipfile.ZipInfo(place)

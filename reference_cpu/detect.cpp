@@ -232,9 +232,9 @@ std::vector<uint8_t> swept_over(const Setup& setup, const State& state) {
   return found;
 }
 
-// The criterion that AFCC rejects (§2.3 and Fig. 7): a particle is removed if the deformation gradient A A0⁻¹ of one of
-// its clusters stretches some direction beyond the threshold. The pseudo-inverse leaves out directions in which the
-// cluster has no extent.
+// The criterion that the paper rejects (§2.3 and Fig. 7): a particle is removed if the deformation gradient A A0⁻¹ of
+// one of its clusters stretches some direction beyond the threshold. The pseudo-inverse leaves out directions in which
+// the cluster has no extent.
 std::vector<uint8_t> too_much_strain(const Setup& setup, const State& state) {
   const Body& body = setup.body;
   const Clusters& clusters = state.clusters;

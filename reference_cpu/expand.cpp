@@ -61,8 +61,8 @@ std::vector<Addition> cover_edges(const Body& body, const State& state, const Me
   return additions;
 }
 
-// AFCC's rule (§2.2.2), cluster by cluster: a cluster that shares no particle takes in the outside ends of the edges of
-// G that leave it.
+// The paper's rule (§2.2.2), cluster by cluster: a cluster that shares no particle takes in the outside ends of the
+// edges of G that leave it.
 std::vector<Addition> free_lone_clusters(const Body& body, const State& state, const Memberships& memberships) {
   std::vector<Addition> additions;
   for (int32_t c = 0; c < state.clusters.count(); ++c) {

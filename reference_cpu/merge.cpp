@@ -213,10 +213,10 @@ void merge_deterministic(MergingSets& sets, std::size_t slot_count) {
 
 // --- published -------------------------------------------------------------------------------------------------
 
-// AFCC's claims (§2.2.3) with roles locked and passes repeated, clusters in the order of their numbers. In a pass each
-// small cluster claims its preferred target once. The claim fails if the claimer has been claimed or the target has any
-// role. A pass without a claim ends the merge: no small cluster has a target, because the first to have one would have
-// succeeded.
+// The paper's claims (§2.2.3) with roles locked and passes repeated, clusters in the order of their numbers. In a pass
+// each small cluster claims its preferred target once. The claim fails if the claimer has been claimed or the target
+// has any role. A pass without a claim ends the merge: no small cluster has a target, because the first to have one
+// would have succeeded.
 void merge_published(MergingSets& sets, std::size_t slot_count) {
   std::vector<uint8_t> has_role(slot_count, 0);
   for (;;) {

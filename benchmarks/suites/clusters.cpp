@@ -17,7 +17,7 @@ using nlohmann::json;
 
 constexpr const char* kScene = "cluster_growth";
 constexpr int64_t kFewParticles = 3000;  // for a quick run
-// Greatest growth that AFCC's "about as many clusters as before" allows at the default τ.
+// Greatest growth that the paper's "about as many clusters as before" allows at the default τ.
 constexpr double kWantedGrowth = 0.03;
 
 double change(const std::vector<int64_t>& clusters, int64_t to) {

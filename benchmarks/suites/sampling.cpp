@@ -8,7 +8,7 @@ namespace cutproof::benchmarks {
 namespace {
 
 constexpr const char* kKidney = "kidney_101096";
-// Divides AFCC's numbers of particles for a quick run.
+// Divides the paper's numbers of particles for a quick run.
 constexpr int64_t kScaledDown = 16;
 
 }  // namespace

@@ -13,28 +13,28 @@
 
 namespace cutproof::benchmarks {
 
-// Whole frames and each stage while a blade cuts: Table 1 of AFCC, or boxes and kidneys of given sizes.
+// Whole frames and each stage while a blade cuts: Table 1 of the paper, or boxes and kidneys of given sizes.
 struct StagesOptions : TimingOptions {
   std::vector<int64_t> sizes;  // particles; replaces the scenes
   std::vector<std::string> scenes = {"cuboid", "liver", "kidney", "irregular"};
   std::vector<std::string> cooking;  // empty: both of the scenes, boxes of given sizes
-  bool full = false;                 // scenes at AFCC's size
+  bool full = false;                 // scenes at the paper's size
 };
 nlohmann::json run_stages(const StagesOptions& options, const Progress& progress);
 
-// Table 2 of AFCC, a kidney's discontinuous cut at four samplings.
+// Table 2 of the paper, a kidney's discontinuous cut at four samplings.
 struct SamplingOptions : TimingOptions {
   std::string cooking = "boxes";
-  bool full = false;  // AFCC's numbers of particles
+  bool full = false;  // the paper's numbers of particles
 };
 nlohmann::json run_sampling(const SamplingOptions& options, const Progress& progress);
 
-// Fig. 10 of AFCC, the number of clusters while a kidney is cut through.
+// Fig. 10 of the paper, the number of clusters while a kidney is cut through.
 struct ClustersOptions {
   std::string backend = harness::kReferenceName;
   std::vector<double> taus = {0.25, 0.5, 0.75};  // a curve each, and one without merging
   std::optional<int64_t> particles;
-  bool full = false;  // AFCC's number of particles
+  bool full = false;  // the paper's number of particles
 };
 inline constexpr int64_t kPaperParticles = 37'704;  // of the scene: the first row of Table 2
 nlohmann::json run_clusters(const ClustersOptions& options, const Progress& progress);

@@ -1,17 +1,17 @@
 #!/usr/bin/env bash
-# What one rank of a campaign does: finds out which share of the cases is its own, and judges that.
+# One rank of a campaign: determines its shard of the cases, and judges that.
 # Usage: fuzz_shard.sh RESULTS [OPTIONS of cutproof fuzz]
-#        fuzz_shard.sh --program       prints which program it would run
+#        fuzz_shard.sh --program       prints the program that it would run
 # Writes RESULTS/shard_I_of_N.json, shard_I_of_N.log and counterexamples; exits as `cutproof fuzz` does.
 #
-# Which shard, by the first of these that is set (no library of any of them is needed):
+# The shard, by the first of these that is set (none of their libraries is needed):
 #   CUTPROOF_SHARD                             I/N, to run a lost one again by hand
 #   OMPI_COMM_WORLD_RANK, OMPI_COMM_WORLD_SIZE Open MPI's mpirun
 #   PMI_RANK, PMI_SIZE                         MPICH's mpiexec, srun --mpi=pmi2
 #   SLURM_ARRAY_TASK_ID, _COUNT, _MIN, _MAX    a job array
 #   SLURM_PROCID, SLURM_NTASKS                 srun
-# CUTPROOF_SHARDS: N, where an array is only the part of a campaign that was lost: --array=3,7-12 with CUTPROOF_SHARDS=64
-# runs shards 3 and 7 to 12 of 64.
+# CUTPROOF_SHARDS: N, where an array is only the lost part of a campaign: --array=3,7-12 with CUTPROOF_SHARDS=64 runs
+# shards 3 and 7 to 12 of 64.
 # CUTPROOF: the program (default: of this build or installation, else the one in PATH).
 # CUTPROOF_THREADS: of this rank (default: its share of the machine).
 set -euo pipefail
@@ -51,7 +51,7 @@ elif [ -n "${PMI_RANK:-}" ]; then
   number PMI_SIZE "${PMI_SIZE:-}"
   shard=$((10#$PMI_RANK + 1)) shards=$PMI_SIZE
 elif [ -n "${SLURM_ARRAY_TASK_ID:-}" ]; then
-  # Several tasks of one element would all do the same.
+  # Several tasks of one element would all run the same shard.
   [ "${SLURM_PROCID:-0}" = 0 ] || refuse "an element of a job array is one shard: leave --ntasks out"
   number SLURM_ARRAY_TASK_ID "$SLURM_ARRAY_TASK_ID"
   if [ -n "${CUTPROOF_SHARDS:-}" ]; then
@@ -74,7 +74,7 @@ else
   refuse "nothing says which shard this is: set CUTPROOF_SHARD=I/N, or start it with mpirun, srun or as a job array"
 fi
 
-# Ranks of one machine share it. nproc knows what a rank is bound to.
+# Ranks of one machine share it; nproc knows a rank's cores.
 threads=${CUTPROOF_THREADS:-}
 if [ -z "$threads" ]; then
   here_as_well=${OMPI_COMM_WORLD_LOCAL_SIZE:-${MPI_LOCALNRANKS:-1}}
@@ -84,7 +84,7 @@ fi
 
 mkdir -p "$results"
 name=$results/shard_${shard}_of_${shards}
-# What an earlier run left must not stand for this one if it is lost.
+# An earlier run's result must not replace this one's if it is lost.
 rm -f "$name.json"
 status=0
 "$program" fuzz "$@" --shard "$shard/$shards" --threads "$threads" --save "$results" --json "$name.json" \

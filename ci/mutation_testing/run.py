@@ -3,24 +3,26 @@
 
 Usage: run.py [--only NAME...] [--shard I/N] [--jobs N] [--json F] [--check] [--prepare]
        run.py --alone [--only NAME...] [--shard I/N] [--jobs N] --json F
-                                  what a user's commands find without this project's tests (ALONE, below)
-       run.py --merge JSON...     makes the table of runs of parts; runs nothing. Results of --alone
-                                  make their section alone
+                                  finds of a user's commands without this project's tests (ALONE, below)
+       run.py --merge JSON...     makes the table from runs of parts; runs nothing. Results of --alone
+                                  make only their section
 
-A mutant is a patch, mutants/NN_name.patch, with a head of lines `Field: text` (a line that begins with a space goes on):
-  Stage     step detect split merge expand skin, or launch: what runs kernels and puts frames together; judge: what
-            judges, reads, draws, searches or prints, so that a wrong program may pass unseen; baseline: another method
-  Fault     what is wrong with the program, for a person
-  Suspect   the gate's command that is expected to find it; may be given several times, tried in this order. A program
-            is known by its name, which is that of its CMake target; a test in Python by its file's.
-  Livelock  yes: the mutant may show as a program that does not end, so running out of time counts as found
+A mutant is a patch, mutants/NN_name.patch, with a head of lines `Field: text` (a line that begins with a space
+continues the previous one):
+  Stage     step detect split merge expand skin, or launch: code that runs kernels and composes frames; judge: code
+            that judges, reads, draws, searches or prints, whose faults may hide a wrong program;
+            baseline: another method
+  Fault     the program's fault, for a person
+  Suspect   the gate's command that is expected to find it; may be given several times, tried in this order. It names
+            a program by its CMake target, a test in Python by its file
+  Livelock  yes: the mutated program may never end, so a timeout counts as found
 
 There is one copy (build/mutation_testing/tree) with one build folder, without CUDA. The unchanged code must pass every
 command that is used. Then for each mutant: patch, build what its suspects need, run them until one finds it; if none
 does, the tests of its stage, the properties, and five minutes of `cutproof fuzz`; for one of the judge the tests of the
-folders that it patches, because a campaign on right programs is silent about a judge that accepts too much. A mutant
-that does not apply or does not compile is an error, not a find. Writes results/mutation_testing.json and the tables of
-its page (ci/results.sh) unless --only or --shard is given. Exit status: 0 every mutant was found, 1 one was not or the
+folders that it patches, because a campaign on right programs cannot show that a judge accepts too much. A mutant that
+does not apply or does not compile is an error, not a find. Writes results/mutation_testing.json and the tables of its
+page (ci/results.sh) unless --only or --shard is given. Exit status: 0 every mutant was found, 1 one was not or the
 unchanged code fails, 2 bad usage or a bad patch.
 """
 import argparse
@@ -44,8 +46,8 @@ WORK = ROOT / "build" / "mutation_testing"
 TREE, BUILD, RUN = WORK / "tree", WORK / "build", WORK / "run"
 TABLE = ROOT / "results" / "mutation_testing.json"
 STAGES = ("step", "detect", "split", "merge", "expand", "skin", "launch", "judge", "baseline")
-# What a mutant may patch: simulators, and with the stage `judge` all that says whether they are right. The tests of the
-# latter, for where suspects find nothing; without those that take minutes.
+# Folders that a mutant may patch: simulators; with the stage `judge` all that judges them. For the latter also the
+# tests that run after suspects have failed, without those that take minutes.
 SIMULATORS = ("gpu", "reference_cpu")
 HARNESS = "harness_test --gtest_filter=-*FaultySimulator*"
 TESTS_OF_JUDGES = {
@@ -61,7 +63,7 @@ TESTS_OF_JUDGES = {
     "guests": ("guests_test",),
 }
 FIELDS = ("Stage", "Fault", "Suspect", "Livelock")
-# What finds a simulator's fault without the tests of this project: campaigns, and scenes that are checked.
+# Commands that find a simulator's fault without this project's tests: campaigns, and checked scenes.
 ALONE = {
     "dissections": [f"fuzz --cases 2000 --seed 1 --shrink 0 --save {RUN}"],
     "moving cases": [f"fuzz --dynamics --cases 2000 --seed 1 --shrink 0 --save {RUN}"],
@@ -71,12 +73,12 @@ ALONE_FORMAT = "cutproof.mutants_alone"
 MOST_SECONDS = 420  # of one command
 FUZZ_SECONDS = 300  # of the last resort
 FUZZ_FAILS = re.compile(r"case (\d+) FAILS: '(.*?)' fails after")
-# What a counterexample should be at most, for a person to see through it; and in how many of ten.
+# The size of a counterexample that a person understands, and the share that should have it.
 MOST_STROKES, MOST_PARTICLES, WANTED_SIMPLE = 3, 30, 0.8
 
 
 class BadMutant(Exception):
-    """A mutant that says nothing about the gate: it does not apply, does not compile, or its suspect runs nothing."""
+    """A mutant without information about the gate: it does not apply, does not compile, or its suspect runs nothing."""
 
 
 @dataclasses.dataclass
@@ -87,7 +89,7 @@ class Mutant:
     text: str
     suspects: list
     livelock: bool
-    files: list  # that it patches
+    files: list  # that the mutant patches
 
     @property
     def code(self):
@@ -126,7 +128,7 @@ def read_mutant(path):
 # --- The copy --------------------------------------------------------------------------------------------------------
 
 def copy_tree():
-    """Makes TREE the working tree; files that are the same keep their times, so that little is built again."""
+    """Makes TREE the working tree; unchanged files keep their times, so that little is rebuilt."""
     listed = subprocess.run(["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"], cwd=ROOT,
                             check=True, capture_output=True, text=True).stdout.split("\0")
     wanted = {name for name in listed if name and (ROOT / name).is_file()}
@@ -142,7 +144,7 @@ def copy_tree():
 
 
 def apply(mutant, check_only=False, tree=TREE):
-    # Outside of any repository, as far as git can see: inside one it would skip files that are ignored.
+    # Outside of any repository for git: inside one it would skip ignored files.
     environment = dict(os.environ, GIT_CEILING_DIRECTORIES=str(tree.parent))
     command = ["git", "apply", "--whitespace=nowarn"] + (["--check"] if check_only else []) + [str(mutant.path)]
     done = subprocess.run(command, cwd=tree, env=environment, capture_output=True, text=True)
@@ -152,7 +154,7 @@ def apply(mutant, check_only=False, tree=TREE):
 
 @contextlib.contextmanager
 def applied(mutant):
-    """The mutant is in the copy as long as this lasts."""
+    """Keeps the mutant in the copy while this lasts."""
     before = {file: (TREE / file).read_bytes() for file in mutant.files}
     apply(mutant)
     try:
@@ -221,14 +223,14 @@ class Outcome:
 
 
 def run(command, may_hang=False):
-    """One command of the gate. Raises BadMutant if it says nothing: it ran no test, or did not understand its options."""
+    """One command of the gate. Raises BadMutant if it ran no test or rejected its options."""
     name, *arguments = shlex.split(command)
     is_fuzz, is_python = name == "cutproof", name.endswith(".py")
     started = ["/usr/bin/python3", "-B", program(name)] if is_python else [program(name)]
     if not is_fuzz:
         arguments.append("--failfast" if is_python else "--gtest_fail_fast")
     RUN.mkdir(exist_ok=True)
-    # Counterexamples of `cutproof fuzz` are shrunk and counted; nobody reads those of rapidcheck.
+    # Counterexamples of `cutproof fuzz` are shrunk and counted; those of rapidcheck are not used.
     saved = RUN / "counterexamples"
     shutil.rmtree(saved, ignore_errors=True)
     saved.mkdir()
@@ -286,7 +288,7 @@ def read_tests(text):
         raise BadMutant("its suspect runs no test: " + text.strip()[-200:])
     tests = re.findall(r"^\[ RUN      \] (\S+)", text, re.MULTILINE)
     if "[  FAILED  ]" not in text:
-        # A crash names no test: it is the last one that began. Otherwise nothing failed.
+        # A crash names no test: the last one that began has crashed. Otherwise nothing failed.
         return Outcome(False, by=tests[-1] if tests and "[  PASSED  ]" not in text else "")
     failed = re.search(r"^\[  FAILED  \] (\S+?),? ", text, re.MULTILINE).group(1)
     cases = re.search(r"Falsifiable after (\d+) test", text)
@@ -339,7 +341,7 @@ def backends_of(mutant):
 
 
 def alone(backends):
-    """For each of ALONE the property that fails first of the program that is built; "" if everything holds."""
+    """For each of ALONE the first property that the built program fails; "" if everything holds."""
     RUN.mkdir(parents=True, exist_ok=True)
     result = RUN / "alone.json"
     found = {}
@@ -385,12 +387,12 @@ def simplicity(rows):
 
 
 def read_table():
-    """The table as it stands; what a run does not make stays in it."""
+    """The present table; a run keeps the parts that it does not make."""
     return json.loads(TABLE.read_text()) if TABLE.exists() else {"rows": [], "alone": None, "hours": 0}
 
 
 def write_document(hours, rows, alone):
-    """One line for each mutant; the tables of the page are made of it."""
+    """One line for each mutant; the page's tables are made from it."""
     head = {"format": "cutproof.mutants", "format_version": 1, "hours": round(hours, 1), "stages": STAGES, "alone": alone}
     lines = [f" {json.dumps(key)}: {json.dumps(value)}," for key, value in head.items()]
     lines += [' "rows": [', ",\n".join("  " + json.dumps(row, ensure_ascii=False) for row in rows), " ]"]
@@ -399,7 +401,7 @@ def write_document(hours, rows, alone):
 
 
 def write_alone(by_itself):
-    """Puts what --alone has found into the table: for each stage of those asked [found, asked] by each of ALONE and by any."""
+    """Puts the finds of --alone into the table: for each stage [found, asked] by each of ALONE and by any."""
     stages = {name: read_mutant(HERE / "mutants" / f"{name}.patch").stage for name in by_itself}
     counts = {}
     for stage in (*STAGES, "all"):
@@ -533,7 +535,7 @@ def main():
             outcome, command = judge(mutant, options.jobs)
         except BadMutant as error:
             raise BadMutant(f"{mutant.path.name}: {error}") from None
-        # A command that nobody suspected has not been asked about the unchanged code.
+        # A command that is no suspect has not run on the unchanged code.
         if outcome and command not in commands:
             holds = passes_unchanged(command, options.jobs) and holds
         row = {"name": mutant.name, "stage": mutant.stage, "fault": mutant.text, "code": mutant.code,

@@ -412,7 +412,8 @@ inline constexpr int kStrainTeam = 32;  // lanes of a cluster
 
 }  // namespace detect_detail
 
-// slot_flag: clusters stretched too much in some direction. AFCC rejects this criterion (Fig. 7); it is a baseline.
+// slot_flag: clusters stretched too much in some direction. The paper rejects this criterion (Fig. 7); it is a
+// baseline.
 template <class Block>
 CUTPROOF_DEVICE void flag_strained_clusters_kernel(Block& block, DeviceView w) {
   using namespace detect_detail;
