@@ -157,7 +157,7 @@ std::vector<Disturbance> make_disturbances() {
     setup.step.stiffness *= 1 + size;
     return setup.step.solver == Solver::implicit && setup.step.iterations > 0;
   });
-  // Friction is reduced: more holds only what is held already.
+  // Friction decreases: an increase would hold only particles that are held already.
   run("friction", "1", kParameters, [](Setup& setup, State&, double size) {
     bool any = setup.has_blade && setup.blade.friction > 0;
     setup.blade.friction /= 1 + size;

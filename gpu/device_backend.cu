@@ -72,8 +72,8 @@ class DeviceArrays {
 
   const DeviceView& view() const { return view_; }
 
-  // Copies the used part of the state into the staging's vectors. `counters`: those of the device. All copies wait for
-  // the stream, and the call waits for all of them together.
+  // Copies the used part of the state into the staging's vectors. `counters`: those of the device. Copies follow the
+  // stream's work, and the call waits once for all of them.
   void download(StagingBuffers& staging, const Counters& counters, cudaStream_t stream, LandingPlace& landing) const {
     static_cast<Extents&>(staging) = in_use(view_, counters);
     DeviceView pointers = view_;

@@ -33,8 +33,8 @@ void enqueue_span(Launcher& launcher, const DeviceView& w, const Plan& plan, Spa
   const bool skin = span.contains(Stage::skin);
   // A whole frame places vertices without waiting for the next frame's groups.
   const bool places_at_once = span.is_whole_frame() && plan.skin;
-  // A small load places vertices during detection, as if nothing were cut, and again after a cut; nothing waits for the
-  // first time. (With RemovedEnds::nearer detection computes centres of clusters too, so vertices wait.)
+  // A small load places vertices during detection, as if nothing were cut. After a cut it places them again, and
+  // nothing waits for that. (With RemovedEnds::nearer detection computes centres of clusters too, so vertices wait.)
   const bool places_early = places_at_once && plan.detection && !plan.nearer &&
                             w.particles <= step_detail::kMostByRows && launcher.overlaps();
   const auto detect = [&](Launcher& on) {

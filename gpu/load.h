@@ -18,9 +18,9 @@ enum class Path {
   eager,  // kernels one by one, waiting for each condition
 };
 
-// gpu: arrays of at least `array` bytes get memory where they are touched, in pages of 2 MiB, if a load leaves at least
-// `room` bytes of them empty (both small for tests). CUDA allocates pages in pieces of 128 MiB. The last piece of a
-// load may stay nearly empty, as may a piece that a frame begins.
+// gpu: arrays of at least `array` bytes get memory where they are touched, in pages of 2 MiB. This applies if a load
+// leaves at least `room` bytes of them empty. (Both are small for tests.) CUDA allocates pages in pieces of 128 MiB.
+// The last piece of a load may stay nearly empty, as may a piece that a frame begins.
 struct OnDemand {
   std::size_t array = std::size_t{4} << 20;
   std::size_t room = std::size_t{256} << 20;

@@ -70,8 +70,7 @@ void split(const Setup& setup, State& state) {
 
   // By I2 no cluster contained a dead particle when the frame began, so a dead member was lost in this frame.
   Clusters after;
-  std::vector<std::pair<int32_t, std::vector<int32_t>>>
-      separated;  // parent, members of the components that get new numbers
+  std::vector<std::pair<int32_t, std::vector<int32_t>>> separated;  // parent, members; get new numbers
   bool changed = false;
   for (int32_t c = 0; c < before.count(); ++c) {
     const auto members = before.of(c);

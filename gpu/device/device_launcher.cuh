@@ -211,9 +211,8 @@ struct DeviceResources {
   std::size_t required = 0;  // most bytes of temporary memory that any launch asked for
   std::size_t allocated = 0;
   DeviceMemory temporary;
-  std::vector<Stream> inner;  // for capturing bodies of conditions, by depth
-  std::vector<std::shared_ptr<DeviceResources>>
-      beside;  // of parallel work; and parallel to a part of the first piece, …
+  std::vector<Stream> inner;                             // for capturing bodies of conditions, by depth
+  std::vector<std::shared_ptr<DeviceResources>> beside;  // of parallel work, by nesting in first pieces
 
   DeviceResources() {
     int device = 0;

@@ -24,8 +24,7 @@ class HostLauncher {
  public:
   struct Threads {
     int count = 1;                // operating-system threads, the caller's included
-    int of_block = kHostThreads;  // 1: quick, but then the rules of block.h cannot be broken, so nothing tells whether
-                                  // they are kept
+    int of_block = kHostThreads;  // 1: quick, but cannot check the rules of block.h
   };
   using Simulated = SimulationOptions;
 

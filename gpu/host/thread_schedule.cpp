@@ -24,7 +24,7 @@ struct SplitMix {
   int below(int bound) { return static_cast<int>(operator()() % static_cast<std::uint64_t>(bound)); }
 };
 
-// Without the processor's instruction std::popcount calls a function of libgcc.
+// Built for processors without the instruction, std::popcount calls a function of libgcc.
 int count_of(std::uint32_t mask) {
   mask -= mask >> 1 & 0x55555555u;
   mask = (mask & 0x33333333u) + (mask >> 2 & 0x33333333u);

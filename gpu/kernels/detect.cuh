@@ -3,8 +3,8 @@
 //
 // Rounding of decisions, compared with exact arithmetic on the same stored numbers (u = 2^-24):
 // - distance: d_i > epsilon h is inconclusive where |d_i - epsilon h| <= 8 u (1 + epsilon) h. An edge is h e plus a
-//   difference of displacements, so the body's place does not matter. The sum has u for the difference, u for the sum,
-//   and 1.5 u for the squares and their sum. It has u each for h, epsilon, their product and its square.
+//   difference of displacements, so the body's place does not matter. The bound adds u for the difference, u for
+//   the sum, 1.5 u for the squares and their sum, and u each for h, epsilon, their product and its square.
 // - distance, where one end of each edge is removed: a fate is also inconclusive if this holds of a neighbour's edge.
 //   So it is where an end is as near to the blade's plane as places are rounded (as for geometric). By the nearer end
 //   it also is where the distances to which the clusters carry both ends differ from the limit by no more than their

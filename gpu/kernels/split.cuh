@@ -1,7 +1,7 @@
 // Stage split (method.md §5): every cluster with a dead particle becomes the connected components of its rest, all
 // clusters at once.
 //
-// The labelled graph has a node for each (cluster, particle) pair, known by its place in DeviceView::members, and an
+// The labelled graph has a node for each (cluster, particle) pair, known by its place in DeviceView::members. It has an
 // edge where two particles of one cluster are neighbours in G. Members ascend within a cluster, so a component's
 // smallest particle has its smallest place. That place is the component's label, with both methods:
 // - SplitMethod::global_labels: hooking over all pairs at once in global memory, as ECL-CC does;
