@@ -524,7 +524,7 @@ CUTPROOF_DEVICE void regroup_members_kernel(Block& block, DeviceView w) {
     if (components == 0 && block.thread() == 0) w.slot_size[s] = 0;
     block.sync();
 
-    // Members in ascending order, a chunk at a time: each goes behind those of its component that are before it.
+    // Members in ascending order, a chunk at a time: each goes behind the earlier ones of its component.
     int done[kMostScanned] = {};  // members of each component in earlier chunks, if there are few components
     for (int from = 0; from < size; from += block.size()) {
       const int k = from + block.thread();
