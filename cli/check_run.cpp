@@ -24,7 +24,8 @@ namespace cutproof::cli {
 
 namespace {
 
-// "The blade has made 2 pieces (48 and 36 particles); the simulator couples 1 body."; of many, the largest.
+// "At the end the blade has made 2 pieces (48 and 36 particles), and the simulator couples 1 body."; of many, the
+// largest.
 std::string in_words(const oracles::RunPieces& pieces) {
   if (pieces.units == 0) return "The run has no tissue that pieces could be told of.";
   std::string sizes;
@@ -33,16 +34,17 @@ std::string in_words(const oracles::RunPieces& pieces) {
   }
   if (pieces.sizes.size() > 5) sizes += ", …";
   const bool is_one = pieces.sizes.size() == 1 && pieces.sizes[0] == 1;
-  std::string text =
-      fmt::format("{} {} ({} {})", pieces.pieces > pieces.at_first ? "The blade has made" : "The tissue is",
-                  counted(pieces.pieces, "piece", "pieces"), sizes,
-                  std::string(pieces.of_cells ? "cell" : "particle") + (is_one ? "" : "s"));
+  std::string text = fmt::format(
+      "{} {} ({} {})", pieces.pieces > pieces.at_first ? "At the end the blade has made" : "At the end the tissue is",
+      counted(pieces.pieces, "piece", "pieces"), sizes,
+      std::string(pieces.of_cells ? "cell" : "particle") + (is_one ? "" : "s"));
   const bool is_open = pieces.at_most > pieces.pieces;
   if (is_open)
-    text += fmt::format(". Where the blade only touches the tissue, up to {} pieces are possible", pieces.at_most);
-  if (pieces.coupled > 0)
     text +=
-        fmt::format("{} simulator couples {}", is_open ? ". The" : "; the", counted(pieces.coupled, "body", "bodies"));
+        fmt::format(". How it parts tissue that it only touches is open: up to {} pieces are right", pieces.at_most);
+  if (pieces.coupled > 0)
+    text += fmt::format("{} simulator couples {}", is_open ? ". The" : ", and the",
+                        counted(pieces.coupled, "body", "bodies"));
   return text + ".";
 }
 

@@ -21,6 +21,8 @@ struct Witness {
   std::string text;                // one sentence for a person
   // Triangles of the skin that show it, by their place in it, at most kMostWitnessTriangles.
   std::vector<int32_t> triangles = {};
+  // Of a run: the first and the last frame of each range in which the property fails, ascending.
+  std::vector<int64_t> frames = {};
 
   friend bool operator==(const Witness&, const Witness&) = default;
 };

@@ -24,23 +24,26 @@ void add_coverage(Sheet& sheet, const Field& document, bool moves) {
   if (!coverage.there().is_object()) coverage.refuse("this is no object");
   Grid grid;
   grid.title = "What occurred in the cases";
-  grid.words = moves ? "Coverage classes: what a campaign must have met to say anything about it."
-                     : "Coverage classes: what a campaign must have met to say anything about it. Classes that need "
-                       "bodies that move (--dynamics) are left out.";
+  grid.words = moves ? "Coverage classes: a class that never occurred has not been tested."
+                     : "Coverage classes: a class that never occurred has not been tested. Classes of moving bodies "
+                       "(--dynamics) are left out.";
   grid.columns = {{"class"}, {"cases", true}};
+  std::string absent;
   for (const auto& each : coverage.value->items()) {
     const std::string name = each.key();  // clang captures no binding
     const nlohmann::json& value = each.value();
     const int64_t count = Field{&value, coverage.file, coverage.path + "." + name, coverage.remedy}.count();
     if (count == 0 && !moves && !occurs_at_rest(name)) continue;
     grid.rows.push_back({{name, io::grouped(count)}, count == 0 ? "warn" : ""});
+    if (count == 0) absent += (absent.empty() ? "" : ", ") + name;
     if (name == "uncoupled without promise" && count > 0) {
       sheet.notes.push_back(
-          fmt::format("Not promised: in {} connected tissue lost its coupling, where no rule promises otherwise; this "
-                      "is counted and not judged.",
+          fmt::format("Not promised: in {} connected tissue lost its coupling. The rules of those scenes allow it, so "
+                      "it is counted and not judged.",
                       cases_in_words(count)));
     }
   }
+  if (!absent.empty()) sheet.notes.push_back("Never occurred, so untested: " + absent + ".");
   std::stable_sort(grid.rows.begin(), grid.rows.end(),
                    [](const GridRow& a, const GridRow& b) { return a.kind > b.kind; });
   sheet.pieces.emplace_back(std::move(grid));
@@ -156,9 +159,8 @@ Sheet campaign_sheet(const Field& document, const std::string& failure) {
     sheet.notes.push_back(fmt::format("The backend refused {}: nothing is known of them.", cases_in_words(refused)));
   if (properties.inconclusive > 0)
     sheet.notes.push_back(
-        fmt::format("Inconclusive within rounding: {} of the things that were looked at may be wrong and were not "
-                    "found to be; they "
-                    "count as right, and the table says of which properties.",
+        fmt::format("Inconclusive within rounding: {} comparisons were too close to rounding to tell. They "
+                    "count as right; the table names their properties.",
                     io::grouped(properties.inconclusive)));
   if (const Field steps = document["steps_compared"]; steps.is_there())
     sheet.notes.push_back(fmt::format(

@@ -168,8 +168,8 @@ PropertyTable property_table(const Field& properties) {
   });
   table.grid.title = "Every property";
   table.grid.words =
-      "What fails comes first, then what comes nearest to its bound. “Inconclusive within rounding” counts things that "
-      "may be wrong and were not found to be; they count as right.";
+      "What fails comes first, then what comes nearest to its bound. “Inconclusive within rounding” counts comparisons "
+      "too close to rounding to tell; they count as right.";
   table.grid.columns = {{"property"},
                         {"after"},
                         {"result"},

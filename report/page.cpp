@@ -31,6 +31,7 @@ json finding_json(const Finding& finding, const Marks& marks) {
           {"text", finding.text},
           {"expected", finding.is_expected},
           {"clusters", finding.clusters},
+          {"frames", finding.frames},
           {"marks", to_json(marks)}};
 }
 

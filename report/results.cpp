@@ -99,7 +99,8 @@ void add_verdict(const Field& verdict, const Measured* known, std::vector<Row>& 
   results.findings.push_back({property, stage, frame, measured_text, bound_text, unit, of_bound, source,
                               witness["text"].text(), witness["clusters"].numbers(kMostWitnesses),
                               witness["particles"].numbers(kMostWitnesses), witness["path"].numbers(kMostWitnesses),
-                              witness["triangles"].numbers(kMostWitnesses), is_expected});
+                              witness["triangles"].numbers(kMostWitnesses), witness["frames"].numbers(kMostWitnesses),
+                              is_expected});
 }
 
 void add_verdicts(const Field& document, Results& results) {

@@ -20,6 +20,7 @@ struct Finding {
   std::string bound_source;
   std::string text;  // the witness in words
   std::vector<int32_t> clusters, particles, path, triangles;
+  std::vector<int32_t> frames;  // of a run: first and last of each range in which it fails
   bool is_expected = false;
 };
 

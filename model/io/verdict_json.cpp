@@ -28,6 +28,7 @@ nlohmann::json verdict_json(const Verdict& verdict, bool expected_failure) {
                          {"particles", verdict.witness.particles},
                          {"path", verdict.witness.path},
                          {"triangles", verdict.witness.triangles}};
+    if (!verdict.witness.frames.empty()) result["witness"]["frames"] = verdict.witness.frames;
   }
   return result;
 }

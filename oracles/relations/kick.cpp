@@ -385,7 +385,7 @@ std::string likely_cause(const KickedRuns& runs, const KickAnswer& answer) {
              "share. ",
              share) +
          (runs.tolerance > 0 ? fmt::format("The declared tolerance is {:g}", runs.tolerance)
-                             : "If it is meant, declare a tolerance");
+                             : "If it is meant, declare a tolerance (the array `tolerance`)");
 }
 
 Verdict others_feel_nothing(const Differences& differences, const std::vector<double>& bounds, bool repeats,

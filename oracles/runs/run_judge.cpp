@@ -271,6 +271,7 @@ class RunJudge::Implementation {
     double nearest = -1;                         // measured / bound
     std::string why;                             // it was not asked
     int64_t frames = 0, failing = 0, last = -1;  // frames in which it was judged, and fails; the last of them
+    std::vector<int64_t> ranges;                 // of frames in which it fails: the first and the last of each
     double worst = 0;                            // of what is beyond its bound, and in which frame
     int64_t worst_frame = -1;
     bool last_holds = true;
@@ -296,7 +297,15 @@ class RunJudge::Implementation {
   void count_frame(Found& found, bool holds) {
     const bool is_new = found.last != frame_, had_failed = !is_new && !found.last_holds;
     found.frames += is_new;
-    found.failing += !holds && !had_failed;
+    if (!holds && !had_failed) {
+      ++found.failing;
+      std::vector<int64_t>& frames = found.ranges;
+      if (!frames.empty() && frames.back() + 1 == frame_) {
+        frames.back() = frame_;
+      } else {
+        frames.insert(frames.end(), 2, frame_);
+      }
+    }
     found.last_holds = holds && !had_failed;
     found.last = frame_;
   }
@@ -304,14 +313,15 @@ class RunJudge::Implementation {
   void tell_frames(Which which) {
     Found& found = found_[which];
     if (found.verdict.holds || found.frames == 0) return;
+    found.verdict.witness.frames = found.ranges;
     std::string& text = found.verdict.witness.text;
     if (which == kFinite) {
       text += ". Later frames are not judged";
     } else if (found.failing == 1) {
       text += fmt::format(". The property fails in this frame alone, of {} judged", found.frames);
     } else {
-      text += fmt::format(". The property fails in {} of {} judged frames, first in frame {}", found.failing,
-                          found.frames, found.verdict.frame);
+      text += fmt::format(". The property fails in {} of {} judged frames, first in frame {} and last in frame {}",
+                          found.failing, found.frames, found.ranges.front(), found.ranges.back());
       if (found.worst_frame > found.verdict.frame && std::isfinite(found.worst)) {
         const bool is_count = found.verdict.unit == "1";
         text += fmt::format(", worst in frame {}: {:.3g}{}{}", found.worst_frame, found.worst, is_count ? "" : " ",

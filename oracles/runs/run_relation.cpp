@@ -453,12 +453,11 @@ class RunRelation::Implementation {
     const bool in_first = there == of_b.end() || (here != of_a.end() && *here < *there);
     ++verdict.measured;
     ++found_[kCoupling].failing;
-    fail(
-        kCoupling, {{}, in_first ? *here : *there},
-        "the runs decide differently first in frame {}: {} coupling groups and {}. For example, one of {} particles is "
-        "in the {} run alone{}",
-        frame_, of_a.size(), of_b.size(), (in_first ? *here : *there).size(), in_first ? "first" : "second",
-        noise_runs_ > 0 ? "; a branch that no disturbed run took is possible: disturb more" : "");
+    fail(kCoupling, {{}, in_first ? *here : *there},
+         "the runs decide differently first in frame {}: {} coupling groups and {}. For example, one group of {} "
+         "particles is in the {} run alone{}",
+         frame_, of_a.size(), of_b.size(), (in_first ? *here : *there).size(), in_first ? "first" : "second",
+         noise_runs_ > 0 ? "; a branch that no disturbed run took is possible: disturb more" : "");
   }
 
   std::string other_in_words() const {

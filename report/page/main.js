@@ -64,14 +64,26 @@ function nextFrame(k, by) {
   return Math.min(Math.max(next, 0), last);
 }
 
+// Whether a property of a run fails in a frame.
+function failsIn({ frames }, frame) {
+  return frames.some((from, k) => k % 2 === 0 && from <= frame && frame <= frames[k + 1]);
+}
+
 function timeline() {
   const svg = drawing('svg', { class: 'timeline', viewBox: '0 0 1000 14', preserveAspectRatio: 'none', 'aria-hidden': 'true' });
   const x = (k) => (last ? (1000 * k) / last : 0);
   const mark = (k, kind, y, height) => svg.append(drawing('rect', { class: kind, x: x(k) - 1.5, width: 3, y, height }));
   data.moments.forEach((moment, k) => { if (moment.removed > 0 && isEnd(k)) mark(k, 'cut', 9, 5); });
-  for (const finding of data.findings) if (finding.marks.moment >= 0) mark(finding.marks.moment, finding.expected ? 'warn' : 'bad', 0, 8);
+  for (const finding of data.findings) {
+    const kind = finding.expected ? 'warn' : 'bad';
+    if (finding.marks.moment >= 0) mark(finding.marks.moment, kind, 0, 8);
+    for (let k = 0; k < finding.frames.length; k += 2) {
+      const [from, to] = [finding.frames[k], finding.frames[k + 1]].map((frame) => x(momentOf(frame, 'skin')));
+      svg.append(drawing('rect', { class: kind, x: from - 1.5, width: to - from + 3, y: 0, height: 4 }));
+    }
+  }
   const keys = [];
-  if (data.findings.some((f) => !f.expected)) keys.push(['bad', data.foreign ? 'first failure' : 'a verdict fails']);
+  if (data.findings.some((f) => !f.expected)) keys.push(['bad', data.foreign ? 'a property fails; high: first' : 'a verdict fails']);
   if (data.findings.some((f) => f.expected)) keys.push(['warn', 'fails as expected']);
   if (data.moments.some((m) => m.removed > 0)) keys.push(['cut', 'particles are removed']);
   if (data.foreign) {
@@ -199,7 +211,10 @@ async function update() {
   const apart = apartInWords(comparison, moment, data.foreign);
   if (apart) facts.push(apart);
   say(status, element('strong', { text: words(moment) }), element('span', { class: 'muted', text: ` · ${facts.join(' · ')}` }));
-  witness.replaceChildren(...(found ? unbroken(`${found.property} fails here: ${found.text}`) : []));
+  // The first failure has a card with its words.
+  const failing = data.findings.filter((one) => one !== found && failsIn(one, frameOf(state.at))).map((one) => one.property);
+  const also = failing.length ? `${found ? ' Also fails here' : 'Fails here'}: ${[...new Set(failing)].join(', ')}.` : '';
+  witness.replaceChildren(...(found ? unbroken(`${found.property} fails here${data.foreign ? '.' : `: ${found.text}`}`) : []), also);
   showInPlots();
   document.documentElement.dataset.moment = state.at;
   if (!view) return;
@@ -208,7 +223,7 @@ async function update() {
   if (ticket !== shown) return;  // somebody has gone on meanwhile
   const spot = state.spot === null ? null : { particles: [state.spot], path: [], members: [] };
   const marks = found && marksOf(found);
-  const said = view.show(arrays, abouts, look, marks && hasPlace(marks) ? marks : spot);
+  const said = view.show(arrays, abouts, { ...look, way: look.way && !found }, marks && hasPlace(marks) ? marks : spot);
   const legends = [element('span', { text: said.words })];
   if (said.blade) legends.push(element('span', { id: 'blade-words', text: ` ${said.blade}` }));
   if (said.scale) {
