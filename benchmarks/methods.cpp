@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <utility>
@@ -413,7 +414,8 @@ std::optional<Vec3> ConvergedKidney::at_rest_place(Vec3 place) const {
   return sum;
 }
 
-nlohmann::json row_of(Method& method, const Kidney& kidney, const ConvergedKidney* truth, bool with_kicks) {
+nlohmann::json row_of(Method& method, const Kidney& kidney, const ConvergedKidney* truth, bool with_kicks,
+                      const std::string& folder) {
   nlohmann::json row = {{"name", method.name()},
                         {"source", method.source()},
                         {"settings", method.settings()},
@@ -423,12 +425,17 @@ nlohmann::json row_of(Method& method, const Kidney& kidney, const ConvergedKidne
                         {"fails", nlohmann::json::array()},
                         {"felt", {{"blade_in", nullptr}, {"withdrawn", nullptr}}}};
   for (const char* const figure :
-       {"seconds_per_second", "frame", "cutting", "error", "lost", "pieces", "fragments", "spin_kept"})
+       {"seconds_per_second", "by_frame", "frame", "cutting", "error", "lost", "pieces", "fragments", "spin_kept"})
     row[figure] = nullptr;
   MethodRun run = method.run(kidney, kidney.scene.frames, nullptr);
   if (!run.refused.empty()) {
     row["refused"] = run.refused;
     return row;
+  }
+  if (!folder.empty()) {
+    std::filesystem::create_directories(folder);
+    for (std::size_t f = 0; f < run.frames.size(); ++f)
+      io::write_array_file(fmt::format("{}/{:06}.npz", folder, f), run.frames[f]);
   }
   const double frame_time = kidney.scene.frame_time;
   double sum = 0;
@@ -438,6 +445,7 @@ nlohmann::json row_of(Method& method, const Kidney& kidney, const ConvergedKidne
     if (is_swept(kidney.scene.blade, static_cast<int64_t>(f) + 1)) cutting.push_back(run.seconds[f]);
   }
   row["seconds_per_second"] = sum / (frame_time * static_cast<double>(run.seconds.size()));
+  row["by_frame"] = run.seconds;
   row["frame"] = to_json(times_of(run.seconds));
   row["cutting"] = to_json(times_of(std::move(cutting)));
   row["timed_by_judge"] = run.timed_by_judge;

@@ -76,7 +76,9 @@ class ConvergedKidney {
   std::vector<Vec3> displacement_;  // [n] world's frame [m]
 };
 
-// The row: docs/reference/schemas/bench_baselines.json, "methods". `truth` may be null.
-nlohmann::json row_of(Method& method, const Kidney& kidney, const ConvergedKidney* truth, bool with_kicks);
+// The row: docs/reference/schemas/bench_baselines.json, "methods". `truth` may be null. `folder`: where the run is
+// saved (docs/reference/run.md), in a new folder; empty: nowhere. Throws InputError if it cannot be written.
+nlohmann::json row_of(Method& method, const Kidney& kidney, const ConvergedKidney* truth, bool with_kicks,
+                      const std::string& folder = {});
 
 }  // namespace cutproof::benchmarks

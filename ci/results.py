@@ -438,6 +438,43 @@ def mutants_by_finder(read):
     return table(["stage", *finders, "mutants"], rows)
 
 
+# Table 3 of the paper [ms], by the name of our method; the sizes are those of the paper.
+PAPER_SIZES = (12800, 37704, 48385, 101096)
+PAPER_FRAMES = {"tets": (22.1, 56.3, 64.4, 105.7), "fem": (70.2, 310.6, 601.1, 2038.6),
+                "clusters deleted, no split": (13.6, 38.9, 46.0, 56.2), "mpm": (22.4, 45.6, 52.0, 70.2),
+                "this method": (20.2, 42.1, 47.0, 59.8)}
+
+
+def methods_on(read, name):
+    def share(value, digits=2):
+        return "–" if value is None else "0" if value == 0 else figure(value, digits)
+
+    rows = []
+    for row in read(name)["methods"]:
+        size = min(PAPER_SIZES, key=lambda one: abs(one - row["particles"]))
+        paper = PAPER_FRAMES.get(row["name"].split("_")[0])
+        frame = f"{paper[PAPER_SIZES.index(size)]:g}" if paper and abs(size / row["particles"] - 1) < 0.03 else "–"
+        settings = f" ({row['settings']})" if row["settings"] else ""
+        if row["refused"]:
+            rows.append([row["name"] + settings, f"{row['particles']:,}", *["–"] * 9, frame])
+            continue
+        rows.append([row["name"] + settings, f"{row['particles']:,}", milliseconds(row["frame"]),
+                     milliseconds(row["cutting"]), figure(row["seconds_per_second"]),
+                     percent(row["error"]["rms"], 1) if row["error"] else "–", row["pieces"]["coupled"],
+                     share(row["felt"]["blade_in"]), share(row["felt"]["withdrawn"]),
+                     percent(row["lost"], 1), share(row["spin_kept"], 3), frame])
+    return table(["method", "particles", "frame, ms", "cutting", "s/s", "error", "bodies", "felt, blade in",
+                  "withdrawn", "lost", "spin", "paper, ms"], rows)
+
+
+def methods_gpu(read):
+    return methods_on(read, "h200_methods")
+
+
+def methods_cpu(read):
+    return methods_on(read, "cpu_methods")
+
+
 def mutants_alone(read):
     alone = read("mutation_testing")["alone"]
     rows = [[stage, *(f"{found}/{asked}" for found, asked in counts)] for stage, counts in alone["stages"].items()]

@@ -1,5 +1,7 @@
 #include "benchmarks/baselines.h"
 
+#include <fmt/format.h>
+
 #include <memory>
 #include <optional>
 
@@ -36,8 +38,10 @@ void add_methods(const BaselinesOptions& options, Report& report, const Progress
   report.document["methods"] = nlohmann::json::array();
   for (const int64_t size : options.sizes) {
     const Kidney kidney = make_kidney(size, options.youngs_modulus);
-    for (const std::unique_ptr<Method>& method : methods) {
-      report.document["methods"].push_back(row_of(*method, kidney, truth ? &*truth : nullptr, options.kicks));
+    for (std::size_t k = 0; k < methods.size(); ++k) {
+      report.document["methods"].push_back(
+          row_of(*methods[k], kidney, truth ? &*truth : nullptr, options.kicks,
+                 options.save.empty() ? "" : fmt::format("{}/{}_{}_{}", options.save, k, methods[k]->name(), size)));
       progress(report.document);
     }
   }

@@ -86,6 +86,7 @@ struct BaselinesOptions {
   double youngs_modulus = 1e4;                // [Pa]
   std::vector<int32_t> iterations = {8, 32};  // of this method, a row each
   bool kicks = true;
+  std::string save;  // folder of their runs; empty: none
 };
 nlohmann::json run_baselines(const BaselinesOptions& options, const Progress& progress);
 

@@ -42,6 +42,7 @@ void add_baselines(CLI::App& bench, Work& work) {
   command->add_option("--iterations", options->iterations, "of this method, a row each")
       ->delimiter(',')
       ->check(whole_number(1, 1000));
+  command->add_option("--save", options->save, "folder in which their runs are kept, for `cutproof check`");
   command->add_flag("!--no-kicks", options->kicks, "kick no piece");
   add_suite(*command, work, "write times and errors as JSON",
             {.run = [options](const auto& progress) { return run_baselines(*options, progress); },
