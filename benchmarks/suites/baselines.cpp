@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
 #include <memory>
 #include <optional>
 
@@ -39,9 +41,15 @@ void add_methods(const BaselinesOptions& options, Report& report, const Progress
   for (const int64_t size : options.sizes) {
     const Kidney kidney = make_kidney(size, options.youngs_modulus);
     for (std::size_t k = 0; k < methods.size(); ++k) {
+      std::string folder;
+      if (!options.save.empty()) {
+        folder = fmt::format("{}_{}_{}", k, methods[k]->name(), size);
+        std::replace_if(
+            folder.begin(), folder.end(), [](char c) { return std::isalnum(static_cast<unsigned char>(c)) == 0; }, '_');
+        folder = options.save + "/" + folder;
+      }
       report.document["methods"].push_back(
-          row_of(*methods[k], kidney, truth ? &*truth : nullptr, options.kicks,
-                 options.save.empty() ? "" : fmt::format("{}/{}_{}_{}", options.save, k, methods[k]->name(), size)));
+          row_of(*methods[k], kidney, truth ? &*truth : nullptr, options.kicks, folder));
       progress(report.document);
     }
   }

@@ -1,4 +1,5 @@
 #include "cli/bench/suites.h"
+#include "cli/output.h"
 
 namespace cutproof::cli {
 
@@ -45,7 +46,11 @@ void add_baselines(CLI::App& bench, Work& work) {
   command->add_option("--save", options->save, "folder in which their runs are kept, for `cutproof check`");
   command->add_flag("!--no-kicks", options->kicks, "kick no piece");
   add_suite(*command, work, "write times and errors as JSON",
-            {.run = [options](const auto& progress) { return run_baselines(*options, progress); },
+            {.run =
+                 [options](const auto& progress) {
+                   if (!options->save.empty()) make_folder("--save", options->save);
+                   return run_baselines(*options, progress);
+                 },
              .begin = print_seed,
              .end = print_baselines});
 }
