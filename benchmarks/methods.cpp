@@ -35,8 +35,9 @@ constexpr int64_t kFeltFrames = 5;    // in which a kick is looked for
 constexpr int64_t kFragment = 8;      // a piece with fewer particles is none that anybody wanted
 constexpr double kTimeLimit = 1800;   // [s] of a plugin for one run
 
-// What the edge of the blade sweeps on the way to each frame of a run; NaN: nothing.
-std::vector<Vec3> swept_by_edge(const Setup& setup) {
+// What the blade sweeps on the way to each frame of a run, from its edge to its back; NaN: nothing. Strokes go along
+// the blade's plane, so it is one quad.
+std::vector<Vec3> swept_by_blade(const Setup& setup) {
   const double nan = std::nan("");
   std::vector<Vec3> corners(4, Vec3{nan, nan, nan});
   const int64_t substeps = setup.step.substeps;
@@ -48,13 +49,15 @@ std::vector<Vec3> swept_by_edge(const Setup& setup) {
       if (first == nullptr) first = &move;
       last = &move;
     }
-    const auto end = [&](const BladePose& pose, double side) {
-      return pose.edge + (side * setup.blade.length / 2) * pose.along;
+    const auto end = [&](const BladePose& pose, double side, double depth) {
+      return pose.edge + (side * setup.blade.length / 2) * pose.along + depth * pose.back;
     };
     if (first == nullptr) {
       corners.insert(corners.end(), 4, Vec3{nan, nan, nan});
     } else {
-      corners.insert(corners.end(), {end(first->from, -1), end(first->from, 1), end(last->to, 1), end(last->to, -1)});
+      const double depth = setup.blade.depth;
+      corners.insert(corners.end(), {end(last->to, -1, 0), end(last->to, 1, 0), end(first->from, 1, depth),
+                                     end(first->from, -1, depth)});
     }
   }
   return corners;
@@ -89,6 +92,36 @@ scenes::Scene scene_of(const Setup& setup, const State& start) {
   scene.frames = setup.frame_count() + 1;
   scene.blades = 1;
   return scene;
+}
+
+// Without particles that are corners of no cell: elements know nothing of them.
+Body corners_of_cells(Body body) {
+  const Grid& grid = body.grid;
+  const std::size_t n = body.node.size();
+  std::vector<uint8_t> is_corner(n, 0);
+  for (std::size_t i = 0; i < n; ++i) {
+    std::array<int32_t, 8> corners;
+    for (int64_t k = 0; k < 8; ++k) {
+      const int64_t node =
+          body.node[i] + (k & 1) + (k >> 1 & 1) * grid.nodes[0] + (k >> 2) * int64_t{grid.nodes[0]} * grid.nodes[1];
+      corners[at(k)] = body.particle_at[at(node)];
+    }
+    if (std::find(corners.begin(), corners.end(), -1) != corners.end()) continue;
+    for (const int32_t corner : corners) is_corner[at(corner)] = 1;
+  }
+  Body kept = body;
+  kept.node.clear(), kept.mass.clear(), kept.surface_crossing.clear();
+  std::fill(kept.particle_at.begin(), kept.particle_at.end(), -1);
+  for (std::size_t i = 0; i < n; ++i) {
+    if (is_corner[i] == 0) continue;
+    kept.particle_at[at(body.node[i])] = static_cast<int32_t>(kept.node.size());
+    kept.node.push_back(body.node[i]);
+    kept.mass.push_back(body.mass[i]);
+    if (body.surface_crossing.empty()) continue;
+    const auto first = body.surface_crossing.begin() + static_cast<std::ptrdiff_t>(6 * i);
+    kept.surface_crossing.insert(kept.surface_crossing.end(), first, first + 6);
+  }
+  return kept;
 }
 
 // A block that spins: 12 × 6 × 6 particles, 60 frames without gravity.
@@ -349,16 +382,16 @@ Kidney make_kidney(int64_t particles, double youngs_modulus) {
   spec.grips.resize(1);
   // The left end, from which the rest hangs.
   spec.grips.front().low = {0, 0, 0};
-  spec.grips.front().high = {0.2, 1, 1};
+  spec.grips.front().high = {0.4, 1, 1};
   spec.settle = kAfterwards;
   spec.blade->start = kRest;
   spec.expect = {};
   spec.step.gravity = {0, 0, -9.81};
   spec.step.damping = kDamping;
   spec.step.acceleration = Acceleration::chebyshev;
-  fixtures::BuildOptions options;
-  options.particles = particles;
-  fixtures::Built built = fixtures::build(spec, "command line", options);
+  spec.body.particles = particles;
+  fixtures::Built built = fixtures::build_on(corners_of_cells(fixtures::body_of_shape(spec, "command line")), spec,
+                                             "command line", std::nullopt);
   Kidney kidney;
   kidney.setup = std::move(built.setup);
   kidney.start = std::move(built.state);
@@ -366,7 +399,7 @@ Kidney make_kidney(int64_t particles, double youngs_modulus) {
   const double h = kidney.setup.body.grid.spacing, c = spec.clusters.side;
   kidney.setup.step.stiffness = 2 * youngs_modulus / (spec.body.density * c * h * h);
   kidney.scene = scene_of(kidney.setup, kidney.start);
-  kidney.scene.blade = swept_by_edge(kidney.setup);
+  kidney.scene.blade = swept_by_blade(kidney.setup);
   for (int64_t f = 0; f < kidney.scene.frames; ++f) {
     if (!is_swept(kidney.scene.blade, f)) continue;
     if (kidney.uncut == 0) kidney.uncut = f - 1;

@@ -83,7 +83,7 @@ struct BaselinesOptions {
   std::vector<int64_t> sizes = {2000};  // particles of the kidney
   std::string truth;                    // a plugin whose finer kidney is the converged solution; empty: no errors
   int64_t truth_particles = 16'000;
-  double youngs_modulus = 1e4;                // [Pa]
+  double youngs_modulus = 3e4;                // [Pa]
   std::vector<int32_t> iterations = {8, 32};  // of this method, a row each
   bool kicks = true;
   std::string save;  // folder of their runs; empty: none
