@@ -455,8 +455,47 @@ TEST(RunJudge, NamesTwoParticlesOfTheGroupThatJoinsWhatTheBladeHasParted) {
   EXPECT_EQ(across->witness.particles, (std::vector<int32_t>{7, 22})) << across->witness.text;
   for (const char* const words : {" of 24 particles are coupled to another piece in frame 5",
                                   "one coupling group joins particles 7 and 22, which the blade has parted",
-                                  "The property fails in 5 of 10 judged frames, first in frame 5"})
+                                  "The property fails in 5 of 10 judged frames, first in frame 5 and last in frame 9"})
     EXPECT_NE(across->witness.text.find(words), std::string::npos) << across->witness.text;
+  EXPECT_EQ(across->witness.frames, (std::vector<int64_t>{5, 9}));
+}
+
+// One particle in the wrong body is not half of the tissue in it.
+TEST(RunJudge, CountsWhatIsInTheWrongBody) {
+  Bar bar;
+  for (std::size_t f : {6, 8}) {
+    RunCoupling& coupling = bar.coupling[f];
+    coupling.offsets = {0};
+    coupling.members.clear();
+    const RunCoupling right = Bar::springs(true);
+    for (std::size_t k = 0; k < right.members.size(); k += 2) {
+      const int32_t a = right.members[k], b = right.members[k + 1];
+      if (a == 2 || b == 2) continue;  // particle 2 leaves its piece, and joins 3
+      coupling.members.insert(coupling.members.end(), {a, b});
+      coupling.offsets.push_back(std::ssize(coupling.members));
+    }
+    coupling.members.insert(coupling.members.end(), {2, 3});
+    coupling.offsets.push_back(std::ssize(coupling.members));
+  }
+  const std::vector<Verdict> verdicts = bar.verdicts();
+  const auto across = std::find_if(verdicts.begin(), verdicts.end(),
+                                   [](const Verdict& v) { return v.property == "no coupling across pieces"; });
+  ASSERT_NE(across, verdicts.end());
+  EXPECT_EQ(across->measured, 1) << across->witness.text;
+  EXPECT_EQ(across->witness.frames, (std::vector<int64_t>{6, 6, 8, 8}));
+}
+
+// Of a failure that grows the worst frame is told.
+TEST(RunJudge, TellsTheWorstFrame) {
+  Bar bar;
+  for (std::size_t f = 6; f < Bar::kFrames; ++f) {
+    for (Vec3& v : bar.v[f]) v.x += f == 6 ? 1 : f == 8 ? 5 : 0;
+  }
+  for (const Verdict& verdict : bar.verdicts()) {
+    if (verdict.property != "linear momentum") continue;
+    EXPECT_EQ(verdict.frame, 6);
+    EXPECT_NE(verdict.witness.text.find(", worst in frame 8: 60 kg m/s"), std::string::npos) << verdict.witness.text;
+  }
 }
 
 std::string witness_of(const Bar& bar, std::string_view property) {
