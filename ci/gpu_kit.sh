@@ -11,7 +11,7 @@ kit=${2:-gpu_kit}
 most_bytes=60000000  # most that can be sent to such a machine beside the code
 
 programs=(cli/cutproof cli/cutproof-guest tests/gpu/launch_device_test tests/gpu/device_failures_test tests/gpu/kernels_test
-  property_tests/property_tests)
+  property_tests/property_tests tests/baselines/fem_test tests/baselines/mpm_test tests/baselines/tets_test)
 [ -f "$build/CMakeCache.txt" ] || { echo "ci/gpu_kit.sh: $build is no build folder: cmake --preset default -B $build first" >&2; exit 2; }
 # Programs look beside themselves for their libraries and for those of the libraries. (A runpath, the linkers' default,
 # does not apply to the latter.)
@@ -19,11 +19,13 @@ cmake -B "$build" -DCMAKE_BUILD_RPATH='$ORIGIN/../lib' -DCMAKE_EXE_LINKER_FLAGS=
 grep -q '^CMAKE_CUDA_COMPILER:.*nvcc' "$build/CMakeCache.txt" ||
   { echo "ci/gpu_kit.sh: $build has no gpu backend: it needs a CUDA toolkit" >&2; exit 2; }
 guests=(cuda_components cuda_components_in_a_block cuda_components_without_barrier cuda_rotations)
-cmake --build "$build" --target "${programs[@]##*/}" "${guests[@]}"
+methods=(fem_cuda mpm_cuda tets_cuda fem_cpu)
+cmake --build "$build" --target "${programs[@]##*/}" "${guests[@]}" "${methods[@]}"
 
 rm -rf "$kit.new"
 mkdir -p "$kit.new/bin" "$kit.new/lib" "$kit.new/fixtures" "$kit.new/guests"
 for guest in "${guests[@]}"; do install -s "$build/guests/examples/$guest.so" "$kit.new/guests/"; done
+for method in "${methods[@]}"; do install -s "$build/baselines/$method.so" "$kit.new/guests/"; done
 for program in "${programs[@]}"; do
   install -s "$build/$program" "$kit.new/bin/"
   # The machine has its own C library and driver.

@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Runs all that needs a GPU: primitives, failing calls, scenes, properties, compute-sanitizer, timings. Part of the kit
 # from ci/gpu_kit.sh. Usage: run.sh RESULTS [PART...]
-# Parts: primitives failures scenes lockstep determinism properties guests sanitizer timings
+# Parts: primitives failures scenes lockstep determinism properties guests methods sanitizer timings
 set -uo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 results=$(mkdir -p "$1" && cd "$1" && pwd)
 shift
-parts=${*:-primitives failures scenes lockstep determinism properties guests sanitizer timings}
+parts=${*:-primitives failures scenes lockstep determinism properties guests methods sanitizer timings}
 export CUTPROOF_COMMIT=$(cat "$here/commit")
 export PATH="$here/bin:$PATH:/usr/local/cuda/bin"
 cases=${CUTPROOF_CASES:-100000}
@@ -93,6 +93,18 @@ for part in $parts; do
           try "judge_${plugin}_$tool" judge_under "$tool" "$plugin" 'ERROR SUMMARY: 0 errors\|RACECHECK SUMMARY: 0 hazards'
         done
       done ;;
+    methods)
+      for method in fem mpm tets; do
+        try "${method}_test" "${method}_test"
+        try "dissect_$method" cutproof judge "guests/${method}_cuda.so" dissect --cases "${CUTPROOF_SCENES:-1000}" \
+          --time-limit 60 --save "$results"
+        for tool in memcheck racecheck initcheck synccheck; do
+          try "${method}_$tool" compute-sanitizer --tool "$tool" --error-exitcode 9 "${method}_test" --gtest_filter='*cuda*'
+        done
+      done
+      try methods cutproof bench baselines --backend gpu --sizes 12800,37704,48385,101096 --with guests/fem_cuda.so \
+        --with guests/mpm_cuda.so --with guests/mpm_cuda.so,labels=0 --with guests/tets_cuda.so \
+        --truth guests/fem_cuda.so,newton=3 --truth-particles 400000 --json "$results/methods.json" ;;
     sanitizer)
       for tool in memcheck racecheck initcheck synccheck; do
         # Kernels one by one, because racecheck does not support conditional nodes. From one thread, because racecheck
