@@ -158,7 +158,9 @@ TEST(MethodRows, OfThisMethodHold) {
   EXPECT_EQ(row.at("pieces").at("coupled"), 2);
   EXPECT_GT(row.at("lost"), 0);
   EXPECT_TRUE(row.at("error").is_null());
-  EXPECT_NEAR(row.at("spin_kept").get<double>(), 1, 0.05);
+  // Implicit steps lose some of it.
+  EXPECT_GT(row.at("spin_kept"), 0.5);
+  EXPECT_LT(row.at("spin_kept"), 1);
 }
 
 TEST(MethodRows, OfAnotherRuleShowItsFault) {
@@ -172,7 +174,10 @@ TEST(PluginMethods, AreAskedLikeAnyOther) {
   const json row = row_of(*method, kidney(), nullptr, true);
   EXPECT_TRUE(row.at("refused").is_null()) << row.at("refused");
   EXPECT_TRUE(row.at("timed_by_judge"));
-  EXPECT_EQ(row.at("felt").at("withdrawn"), 0.0);
+  // Springs along edges bear no shear: the kidney hangs below the blade, and no piece is there to be kicked.
+  EXPECT_EQ(row.at("fails"), json::array({"something was cut"}));
+  EXPECT_TRUE(row.at("felt").at("withdrawn").is_null());
+  EXPECT_NEAR(row.at("spin_kept").get<double>(), 1, 1e-12);
   EXPECT_THROW(make_plugin_method(CUTPROOF_PLUGIN_OF_WHOLE_FRAMES), InputError) << "it has no dissect";
   EXPECT_THROW(make_plugin_method("/nowhere.so"), InputError);
 }
