@@ -589,7 +589,10 @@ struct Program : Simulator {
           sum.velocity = sum.velocity + w * (of.momentum + of.moved * way_to(of.place, other, dx));
         }
       }
-      if (sum.mass > 0) sum.velocity = (1 / sum.mass) * sum.velocity + fall;
+      // Of a smaller mass the digits, or its inverse, would be lost. It weighs nothing in the velocities of points.
+      const bool is_heavy = sum.mass > 1e-34f;
+      const V3 mean = {sum.velocity.x / sum.mass, sum.velocity.y / sum.mass, sum.velocity.z / sum.mass};
+      sum.velocity = is_heavy ? mean + fall : fall;
       node[t] = sum;
     });
   }

@@ -55,7 +55,8 @@ const cutproof_plugin plugin = {
     .real = kProgram == "cpu" ? CUTPROOF_F64 : CUTPROOF_F32,
     .create = create,
     .destroy = destroy,
-    .limits = nullptr,
+    // Of two plates nearer than a cell of the grid, no node would lie between, and what is there would be cut off.
+    .limits = "gap=2",
     .dissect = answer,
 };
 
