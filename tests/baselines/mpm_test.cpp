@@ -547,7 +547,8 @@ TEST_P(EachProgram, StopsWhatIsThrownAtThePlate) {
     EXPECT_LT(impulse.x(), -thrown);  // it turns back
     for (std::size_t i = 0; i < 64; ++i) EXPECT_LT(frames.back().position[i].x(), 3.5 * kSpacing);
     if (friction == 0) {
-      EXPECT_LE(std::abs(impulse.y()), 1e3 * u() * thrown);
+      // Nothing but the stresses of a sheared stencil that the plate cuts off.
+      EXPECT_LE(std::abs(impulse.y()), 1e-3 * thrown);
     } else {
       // Coulomb: a share of the normal impulse, against the motion, and no more than stops it.
       EXPECT_LT(impulse.y(), -0.1 * thrown);
