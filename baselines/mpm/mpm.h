@@ -114,6 +114,7 @@ struct Grid {
   double cell = 0;
   std::vector<std::array<int32_t, 4>> node;            // [nodes] label, then x, y, z
   std::vector<double> mass;                            // [nodes]
+  std::vector<double> held_mass;                       // [nodes] of held points
   std::vector<Vec3> velocity;                          // [nodes] momentum until grid_velocities() [kg m/s], then m/s
   std::vector<Near> contact;                           // [nodes x plates]
   std::vector<Stencil> stencil;                        // [n]
@@ -128,6 +129,11 @@ void colour(Grid& grid, Points& points, const std::vector<Plate>& plates);
 bool is_compatible(const Grid& grid, const Points& points, std::size_t point, int k);
 // P2G: mass and momentum of compatible points, with the impulse of stresses in dt.
 void to_grid(Grid& grid, const Points& points, const Settings& settings, double dt);
+// A node is clamped where held points have more than this share of its mass. Held points that only lost their own
+// velocity would drag at shared nodes, and tissue would creep. A node half a cell beyond the surface of a held half
+// space has a sixth, so that the clamp lies at the surface within half a cell.
+constexpr double kClampedShare = 0.17;
+bool is_clamped(const Grid& grid, std::size_t node);
 void grid_velocities(Grid& grid, const Vec3& gravity, double dt);
 // G2P, and the motion of points in dt. At incompatible nodes a point finds its own velocity, projected against the
 // plate.

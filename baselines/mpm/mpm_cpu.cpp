@@ -190,6 +190,7 @@ Grid grid_of(const Points& points, double cell) {
     }
   }
   grid.mass.assign(grid.node.size(), 0);
+  grid.held_mass.assign(grid.node.size(), 0);
   grid.velocity.assign(grid.node.size(), Vec3::Zero());
   return grid;
 }
@@ -290,14 +291,18 @@ void to_grid(Grid& grid, const Points& points, const Settings& settings, double 
       if (!is_compatible(grid, points, p, k)) continue;
       const double w = weight(grid, p, k);
       grid.mass[node(grid, p, k)] += w * points.mass[p];
+      if (points.held[p] != 0) grid.held_mass[node(grid, p, k)] += w * points.mass[p];
       grid.velocity[node(grid, p, k)] += w * (points.mass[p] * points.v[p] + affine * way_to(grid, points, p, k));
     }
   }
 }
 
+bool is_clamped(const Grid& grid, std::size_t node) { return grid.held_mass[node] > kClampedShare * grid.mass[node]; }
+
 void grid_velocities(Grid& grid, const Vec3& gravity, double dt) {
   for (std::size_t i = 0; i < grid.node.size(); ++i) {
     if (grid.mass[i] > 0) grid.velocity[i] = grid.velocity[i] / grid.mass[i] + dt * gravity;
+    if (is_clamped(grid, i)) grid.velocity[i].setZero();
   }
 }
 
@@ -336,6 +341,8 @@ void to_points(const Grid& grid, Points& points, const Settings& settings, const
       if (!is_compatible(grid, points, p, k)) {
         found = ghost(k);
         points.impulse[p] += w * (m * (found - points.v[p] - dt * gravity) - affine * way);
+      } else if (is_clamped(grid, node(grid, p, k))) {
+        points.impulse[p] -= w * (m * (points.v[p] + dt * gravity) + affine * way);
       }
       v += w * found;
       moment += w * found * way.transpose();

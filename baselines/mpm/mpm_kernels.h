@@ -243,9 +243,10 @@ struct Packet {
   V3 momentum;
   M3 moved;  // multiplies x_i - x_p: m C - dt V₀ (4 / dx²) τ
   uint32_t sides;
+  bool is_held;
 };
 struct Node {
-  float mass;
+  float mass, held;  // of all points, of held ones; held = 1 and 0 say in the end whether the node is clamped
   V3 velocity;
 };
 
@@ -543,6 +544,7 @@ struct Program : Simulator {
     const M3 *const c = affine.data(), *const f = deformation.data();
     const float *const m = mass.data(), *const v0 = volume.data();
     const uint32_t* const side = sides.data();
+    const uint8_t* const is_held = held.data();
     const int32_t* const who = order.data();
     Packet* const packet = packets.data();
     Behind* const plane = planes.data();
@@ -553,6 +555,7 @@ struct Program : Simulator {
       Packet made;
       made.place = place_in_grid(at[p], dx);
       made.mass = m[p];
+      made.is_held = is_held[p] != 0;
       made.momentum = m[p] * speed[p];
       const M3 stress = stress_of(f[p], mu, lambda);
       const float scale = 4 * dt * v0[p] / (dx * dx);
@@ -577,7 +580,7 @@ struct Program : Simulator {
       if (to[t] != t) return;
       const int64_t c = t / 27;
       const int k = static_cast<int>(t % 27);
-      Node sum = {0, {0, 0, 0}};
+      Node sum = {0, 0, {0, 0, 0}};
       for (int other = k; other < 27; ++other) {
         const int32_t cell = beside_cell[125 * c + between(k, other)];
         if (cell < 0) continue;
@@ -586,6 +589,7 @@ struct Program : Simulator {
           if (are_parted(mark[t], of.sides)) continue;
           const float w = weight_of(of.place, other);
           sum.mass += w * of.mass;
+          if (of.is_held) sum.held += w * of.mass;
           sum.velocity = sum.velocity + w * (of.momentum + of.moved * way_to(of.place, other, dx));
         }
       }
@@ -593,6 +597,8 @@ struct Program : Simulator {
       const bool is_heavy = sum.mass > 1e-34f;
       const V3 mean = {sum.velocity.x / sum.mass, sum.velocity.y / sum.mass, sum.velocity.z / sum.mass};
       sum.velocity = is_heavy ? mean + fall : fall;
+      sum.held = is_heavy && sum.held > static_cast<float>(mpm::kClampedShare) * sum.mass ? 1 : 0;
+      if (sum.held > 0) sum.velocity = {0, 0, 0};
       node[t] = sum;
     });
   }
@@ -638,6 +644,8 @@ struct Program : Simulator {
             found = plates.plate[r].velocity + slip + (push * wall.depth) * wall.normal;
           }
           got = got + w * (of.mass * (found - own) - of.moved * way);
+        } else if (node[s].held > 0) {
+          got = got - w * (of.momentum + of.mass * fall + of.moved * way);
         }
         mean = mean + w * found;
         moment.row[0] = moment.row[0] + (w * found.x) * way;
