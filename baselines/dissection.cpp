@@ -147,9 +147,10 @@ int dissect(Simulator& simulator, const Scene& scene, const cutproof_host* host,
   const auto output = [&](cutproof_array* array) { return Output(host, array); };
   Output particles = output(run->particles), position = output(run->position), velocity = output(run->velocity),
          spin = output(run->spin), mass = output(run->mass), alive = output(run->alive), parent = output(run->parent),
-         group_count = output(run->group_count), offsets = output(run->offsets), members = output(run->members),
-         weights = output(run->weights), cell_count = output(run->cell_count), tetrahedra = output(run->tetrahedra),
-         hexahedra = output(run->hexahedra), steps = output(run->steps), damping = output(run->damping),
+         contact_impulse = output(run->contact_impulse), group_count = output(run->group_count),
+         offsets = output(run->offsets), members = output(run->members), weights = output(run->weights),
+         cell_count = output(run->cell_count), tetrahedra = output(run->tetrahedra), hexahedra = output(run->hexahedra),
+         steps = output(run->steps), damping = output(run->damping),
          seconds = output(CUTPROOF_HAS(run, seconds) ? run->seconds : nullptr);
   bool any_groups = false, any_cells = false;
   int64_t grouped = 0;
@@ -174,6 +175,7 @@ int dissect(Simulator& simulator, const Scene& scene, const cutproof_host* host,
       mass.add(frame.mass);
       alive.add(frame.alive);
       parent.add(frame.parent);
+      if (frame.contact_impulse) contact_impulse.add(frame.contact_impulse->data(), 3);
       any_groups = any_groups || frame.has_groups;
       any_cells = any_cells || frame.has_cells;
       if (any_groups) group_count.add_one(frame.has_groups ? static_cast<int32_t>(frame.offsets.size() - 1) : -1);
@@ -192,8 +194,9 @@ int dissect(Simulator& simulator, const Scene& scene, const cutproof_host* host,
       tetrahedra.add(frame.tetrahedra);
       hexahedra.add(frame.hexahedra);
     }
-    for (Output* each : {&particles, &position, &velocity, &spin, &mass, &alive, &parent, &group_count, &offsets,
-                         &members, &weights, &cell_count, &tetrahedra, &hexahedra, &steps, &damping, &seconds})
+    for (Output* each :
+         {&particles, &position, &velocity, &spin, &mass, &alive, &parent, &contact_impulse, &group_count, &offsets,
+          &members, &weights, &cell_count, &tetrahedra, &hexahedra, &steps, &damping, &seconds})
       each->end();
   } catch (const std::bad_alloc&) {
     return 1;

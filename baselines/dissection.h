@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -53,6 +54,8 @@ struct Frame {
   std::vector<double> mass;                    // [p]
   std::vector<uint8_t> alive;                  // [p]
   std::vector<int32_t> parent;                 // [p] which particle one was split from; -1: none
+  // What contacts and grips gave in the frame [kg m/s]. Of all frames, or of none.
+  std::optional<Vec3> contact_impulse;
   // Coupling groups, or cells, which are groups as well. No value: as in the frame before.
   bool has_groups = false, has_cells = false;
   std::vector<int64_t> offsets = {0};
