@@ -230,11 +230,15 @@ std::vector<Verdict> judge_answer(Guest& guest, const OperationDescription& oper
     return verdicts;
   }
   const Answer second = ask(guest, operation, question, !at_end);
-  const bool answered = second.kind == Answer::Kind::answered, is_same = answered && second.arrays == answer.arrays;
+  const bool answered = second.kind == Answer::Kind::answered;
+  std::string how = second.text;
+  if (answered && operation.difference != nullptr) {
+    how = operation.difference(question, answer.arrays, second.arrays);
+  } else if (answered && second.arrays != answer.arrays) {
+    how = "asked again, it gives another answer";
+  }
+  const bool is_same = answered && how.empty();
   if (again) {
-    std::string how = second.text.empty() ? "asked again, it gives another answer" : second.text;
-    if (answered && !is_same && operation.difference != nullptr)
-      how = operation.difference(question, answer.arrays, second.arrays);
     Verdict same = of_all_cases("determinism", how);
     same.holds = is_same;
     if (same.holds) {

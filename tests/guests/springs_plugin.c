@@ -63,6 +63,11 @@ static int write_frame(const cutproof_host* host, cutproof_frames* run, int64_t 
   if (more(host, run->velocity, n, &begin)) return 1;
   memcpy((double*)run->velocity->data + 3 * begin, v, (size_t)n * 3 * sizeof *v);
   for (int64_t s = 0; s < count; ++s) whole += springs[s].broken == 0;
+  if (is("right")) { /* no two runs take as long */
+    static double clock = 0;
+    if (more(host, run->seconds, 1, &begin)) return 1;
+    ((double*)run->seconds->data)[begin] = clock += 1;
+  }
   if (more(host, run->group_count, 1, &begin)) return 1;
   ((int32_t*)run->group_count->data)[begin] = (int32_t)whole;
   if (run->offsets->rows == 0) {
