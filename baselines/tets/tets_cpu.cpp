@@ -172,8 +172,12 @@ std::vector<Crossing> crossings(const Mesh& mesh, std::span<const Vec3> x, const
       const double from = height(a), to = height(b);
       const double share = (from >= 0) != (to >= 0) ? from / (from - to) : std::abs(from) < std::abs(to) ? 0 : 1;
       const Vec3 there = (1 - share) * x[at(a)] + share * x[at(b)];
-      const auto is_inside = [&](const Vec3& q, const Vec3& r) { return (r - q).cross(there - q).dot(normal) >= 0; };
-      const bool is_crossed = is_inside(p[0], p[1]) && is_inside(p[1], p[2]) && is_inside(p[2], p[0]);
+      const auto inside = [&](const Vec3& q, const Vec3& r) { return (r - q).cross(there - q).dot(normal); };
+      // Of the side that both triangles have, rounding must not put a point beyond both.
+      const double shared = -1e-9 * normal.squaredNorm();
+      const bool is_first = p[1] == patch[1];
+      const bool is_crossed = inside(p[0], p[1]) >= (is_first ? 0 : shared) && inside(p[1], p[2]) >= 0 &&
+                              inside(p[2], p[0]) >= (is_first ? shared : 0);
       if (is_crossed && is_found.emplace(edge, true).second) found.push_back({edge, share});
     }
   }
@@ -239,9 +243,10 @@ class Cpu : public Simulator {
   void cut(const std::vector<Patch>& patches) override {
     // One after the other: an edge that two blades cross falls into three.
     for (const Patch& patch : patches) {
-      const auto parts = mesh_.cut(crossings(mesh_, x_, patch, thickness_));
-      x_ = after_cut(mesh_, parts, x_);
-      v_ = after_cut(mesh_, parts, v_);
+      for (auto parts = mesh_.cut(crossings(mesh_, x_, patch, thickness_)); !parts.empty(); parts = mesh_.cut({})) {
+        x_ = after_cut(mesh_, parts, x_);
+        v_ = after_cut(mesh_, parts, v_);
+      }
     }
     build();
   }

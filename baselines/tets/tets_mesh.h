@@ -12,6 +12,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <span>
 #include <stdexcept>
@@ -67,7 +68,7 @@ class Mesh {
     double volume;  // a quarter of the tetrahedron's [m³]
   };
   // Marks edges and splits what they part. Returns what new tetrahedra give to vertices on edges: of vertices that are
-  // new all of their mass, of others some.
+  // new all of their mass, of others some. New tetrahedra inherit marks, so call it again until it returns nothing.
   std::vector<Part> cut(const std::vector<Crossing>& crossings);
 
  private:
@@ -90,6 +91,7 @@ class Mesh {
   std::vector<double> volume_;
   std::vector<Edge> links_, edges_;
   std::map<Edge, Mark> marks_;
+  std::vector<Edge> inherited_;  // marks that cells have got since they were looked at
 };
 
 // After a cut: places of vertices, or their velocities, for `old` ones. A new vertex lies where the tetrahedron has that
@@ -221,7 +223,7 @@ inline void Mesh::split(const Tetrahedron& whole, const std::array<int, 4>& part
       const auto found = std::find(whole.begin(), whole.end(), corner);
       if (found != whole.end()) of = part[static_cast<std::size_t>(found - whole.begin())];
     }
-    Tetrahedron piece = cell;
+    Tetrahedron piece = cell, origin = cell;
     // By edges, not by corners: numbers of new vertices do not depend on how corners are listed.
     std::array<std::size_t, 4> order = {0, 1, 2, 3};
     std::sort(order.begin(), order.end(), [&](std::size_t k, std::size_t l) { return cell[k] > cell[l]; });
@@ -231,9 +233,11 @@ inline void Mesh::split(const Tetrahedron& whole, const std::array<int, 4>& part
       const Point& point = points[static_cast<std::size_t>(-1 - corner)];
       if (of != point.part[0] && of != point.part[1]) {
         const auto [known, is_new] = here.emplace(std::pair(corner, of), -1);
-        const int32_t parent = whole[static_cast<std::size_t>(std::find(part.begin(), part.end(), of) - part.begin())];
+        int32_t parent = std::numeric_limits<int32_t>::max();
+        for (std::size_t l = 0; l < 4; ++l) parent = part[l] == of ? std::min(parent, whole[l]) : parent;
         if (is_new) known->second = new_vertex(point.edge, point.share, parent);
         corner = known->second;
+        origin[k] = parent;
         continue;
       }
       const std::size_t side = of == point.part[0] ? 0 : 1;
@@ -242,6 +246,18 @@ inline void Mesh::split(const Tetrahedron& whole, const std::array<int, 4>& part
       if (vertex < 0 || is_marked(vertex, point.edge[side]))
         vertex = new_vertex(point.edge, point.share, point.edge[side]);
       corner = vertex;
+      origin[k] = point.edge[side];
+    }
+    // A blade that has passed between two corners has passed between what is new on their sides.
+    for (const auto& [k, l] : kCornersOfEdges) {
+      const auto i = static_cast<std::size_t>(k), j = static_cast<std::size_t>(l);
+      if (piece[i] == origin[i] && piece[j] == origin[j]) continue;
+      const auto mark = marks_.find(edge_of(origin[i], origin[j]));
+      if (origin[i] == origin[j] || mark == marks_.end()) continue;
+      const bool is_turned = (origin[i] < origin[j]) != (piece[i] < piece[j]);
+      const double share = is_turned ? 1 - mark->second.share : mark->second.share;
+      const Edge edge = edge_of(piece[i], piece[j]);
+      if (marks_.try_emplace(edge, Mark{share, {-1, -1}}).second) inherited_.push_back(edge);
     }
     const auto at = [&](std::size_t k) { return rest_[static_cast<std::size_t>(piece[k])]; };
     const double volume = volume_of(at(0), at(1), at(2), at(3));
@@ -264,8 +280,9 @@ inline std::vector<Mesh::Part> Mesh::cut(const std::vector<Crossing>& crossings)
   }
   std::erase_if(links_, [&](const Edge& link) { return is_marked(link[0], link[1]); });
   std::vector<uint8_t> is_met(rest_.size());
-  for (const Crossing& crossing : crossings) {
-    for (const int32_t end : crossing.edge) is_met[static_cast<std::size_t>(end)] = 1;
+  for (const Crossing& crossing : crossings) inherited_.push_back(crossing.edge);
+  for (const Edge& edge : std::exchange(inherited_, {})) {
+    for (const int32_t end : edge) is_met[static_cast<std::size_t>(end)] = 1;
   }
   std::vector<Part> given;
   std::vector<Tetrahedron> pieces;

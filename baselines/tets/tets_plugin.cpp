@@ -60,7 +60,7 @@ cutproof_plugin plugin_of_tets() {
   plugin.promises = "free deterministic no_ghost_force mirror";
   plugin.device = CUTPROOF_HOST;
   plugin.real = kIsDouble ? CUTPROOF_F64 : CUTPROOF_F32;
-  plugin.limits = "cells diagonals cut_resolution=1";
+  plugin.limits = "cells diagonals cut_resolution=0.5";
   plugin.create = create;
   plugin.destroy = destroy;
   plugin.dissect = dissect;
