@@ -44,13 +44,24 @@ struct Stiffness {
 // modulus S / 15. So S = 15 G, and the volume adds K - 5 G / 3, which is none at a ratio of 1/4.
 Stiffness stiffness_of(double youngs_modulus, double poisson_ratio);
 
-// What a substep works on: constraints of a mesh, in ascending order of their vertices.
-struct Constraints {
+// The order in which a substep visits constraints: by colours, so that those of a colour have no vertex in common and
+// may move at once. Colours are greedy, so those of a component depend on that component alone.
+struct Sweep {
   std::vector<std::array<int32_t, 2>> edges;
-  std::vector<double> length, distance_compliance;  // [edges] m, m/N
-  std::vector<double> volume, volume_compliance;    // [tetrahedra] m³, m³/Pa
+  std::vector<std::array<int32_t, 4>> cells;
+  std::vector<std::size_t> edge_starts, cell_starts;  // [colours + 1]
 };
-Constraints constraints_of(const Mesh& mesh, const Stiffness& stiffness);
+Sweep sweep_of(const Mesh& mesh);
+// Numbers such that two constraints with a common vertex differ.
+template <std::size_t N>
+std::vector<int32_t> colours_of(const std::vector<std::array<int32_t, N>>& constraints, int32_t vertices);
+
+// The constraints of a sweep, in its order.
+struct Constraints {
+  std::vector<double> length, distance_compliance;  // [edges] m, m/N
+  std::vector<double> volume, volume_compliance;    // [cells] m³, m³/Pa
+};
+Constraints constraints_of(const Mesh& mesh, const Sweep& sweep, const Stiffness& stiffness);
 
 // Mass of each vertex [vertices]: a quarter of that of each tetrahedron around it. Where that is nothing, `alone`, the
 // mass of the scene's particle.
@@ -73,17 +84,12 @@ void project_volume(std::array<Vec3*, 4> x, std::array<double, 4> w, double volu
                     double& multiplier);
 
 // Energy of the constraints [J].
-double elastic_energy(const Mesh& mesh, const Constraints& constraints, std::span<const Vec3> x);
+double elastic_energy(const Sweep& sweep, const Constraints& constraints, std::span<const Vec3> x);
 
 // Which edges the patch crosses where vertices lie at `x`. A new vertex that is nearer to the blade than `thickness` [m]
 // counts as on the side of its parent: a blade that comes again along a cut takes nothing off. A point in the plane
 // counts as on the positive side, and borders belong to the patch.
 std::vector<Crossing> crossings(const Mesh& mesh, std::span<const Vec3> x, const Patch& patch, double thickness);
-
-// Numbers of constraints such that two with a common vertex differ, greedily in the order given. Those of a component
-// depend on that component alone.
-template <std::size_t N>
-std::vector<int32_t> colours_of(const std::vector<std::array<int32_t, N>>& constraints, int32_t vertices);
 
 }  // namespace tets
 }  // namespace cutproof::baselines

@@ -1,4 +1,4 @@
-// The method in double precision: Gauss-Seidel in the order of the mesh. It is the oracle of the kernels.
+// The method in double precision: Gauss-Seidel, colour by colour. It is the oracle of the kernels.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -60,28 +60,72 @@ Stiffness stiffness_of(double youngs_modulus, double poisson_ratio) {
   return {15 * shear / 6, std::max(bulk - 5 * shear / 3, 0.0)};
 }
 
-Constraints constraints_of(const Mesh& mesh, const Stiffness& stiffness) {
-  Constraints made;
-  made.edges = mesh.edges();
-  std::vector<double> around(made.edges.size());  // m³
-  const auto number = [&](int32_t a, int32_t b) {
-    const auto found = std::lower_bound(made.edges.begin(), made.edges.end(), edge_of(a, b));
-    return static_cast<std::size_t>(found - made.edges.begin());
-  };
-  for (std::size_t c = 0; c < mesh.tetrahedra().size(); ++c) {
-    const Tetrahedron& t = mesh.tetrahedra()[c];
-    for (const auto& [k, l] : kCornersOfEdges)
-      around[number(t[static_cast<std::size_t>(k)], t[static_cast<std::size_t>(l)])] += mesh.volume()[c];
-    made.volume.push_back(mesh.volume()[c]);
-    const bool resists = mesh.volume()[c] > 0 && stiffness.volume > 0;
-    made.volume_compliance.push_back(resists ? mesh.volume()[c] / stiffness.volume : kNone);
+template <std::size_t N>
+std::vector<int32_t> colours_of(const std::vector<std::array<int32_t, N>>& constraints, int32_t vertices) {
+  std::vector<std::vector<bool>> is_taken(at(vertices));  // of each vertex: which colours its constraints have
+  std::vector<int32_t> colours;
+  for (const auto& constraint : constraints) {
+    std::size_t colour = 0;
+    const auto is_free = [&](int32_t i) { return colour >= is_taken[at(i)].size() || !is_taken[at(i)][colour]; };
+    while (!std::all_of(constraint.begin(), constraint.end(), is_free)) ++colour;
+    for (const int32_t i : constraint) {
+      if (is_taken[at(i)].size() <= colour) is_taken[at(i)].resize(colour + 1);
+      is_taken[at(i)][colour] = true;
+    }
+    colours.push_back(static_cast<int32_t>(colour));
   }
-  for (std::size_t e = 0; e < made.edges.size(); ++e) {
-    const auto [a, b] = made.edges[e];
-    const double length = (mesh.rest()[at(b)] - mesh.rest()[at(a)]).norm();
+  return colours;
+}
+template std::vector<int32_t> colours_of(const std::vector<std::array<int32_t, 2>>&, int32_t);
+template std::vector<int32_t> colours_of(const std::vector<std::array<int32_t, 4>>&, int32_t);
+
+namespace {
+
+// Sorted by colours, and where each one begins.
+template <class T>
+std::vector<std::size_t> sort_by_colour(std::vector<T>& constraints, int32_t vertices) {
+  const std::vector<int32_t> colours = colours_of(constraints, vertices);
+  std::vector<std::size_t> starts = {0};
+  std::vector<T> sorted;
+  for (int32_t colour = 0; sorted.size() < constraints.size(); ++colour) {
+    for (std::size_t k = 0; k < constraints.size(); ++k) {
+      if (colours[k] == colour) sorted.push_back(constraints[k]);
+    }
+    starts.push_back(sorted.size());
+  }
+  constraints = std::move(sorted);
+  return starts;
+}
+
+}  // namespace
+
+Sweep sweep_of(const Mesh& mesh) {
+  Sweep sweep = {mesh.edges(), mesh.tetrahedra(), {}, {}};
+  sweep.edge_starts = sort_by_colour(sweep.edges, mesh.size());
+  sweep.cell_starts = sort_by_colour(sweep.cells, mesh.size());
+  return sweep;
+}
+
+Constraints constraints_of(const Mesh& mesh, const Sweep& sweep, const Stiffness& stiffness) {
+  Constraints made;
+  std::vector<double> around(mesh.edges().size());  // m³
+  const auto volume_around = [&](int32_t a, int32_t b) -> double& {
+    const auto found = std::lower_bound(mesh.edges().begin(), mesh.edges().end(), edge_of(a, b));
+    return around[static_cast<std::size_t>(found - mesh.edges().begin())];
+  };
+  const auto rest = [&](int32_t i) { return mesh.rest()[at(i)]; };
+  for (const Tetrahedron& t : sweep.cells) {
+    const double volume = volume_of(rest(t[0]), rest(t[1]), rest(t[2]), rest(t[3]));
+    for (const auto& [k, l] : kCornersOfEdges)
+      volume_around(t[static_cast<std::size_t>(k)], t[static_cast<std::size_t>(l)]) += volume;
+    made.volume.push_back(volume);
+    made.volume_compliance.push_back(volume > 0 && stiffness.volume > 0 ? volume / stiffness.volume : kNone);
+  }
+  for (const Edge& edge : sweep.edges) {
+    const double length = (rest(edge[1]) - rest(edge[0])).norm();
     // A link has no tetrahedron. It counts as an edge of a lattice of its length: a sixth of a cube.
-    const bool is_link = std::binary_search(mesh.links().begin(), mesh.links().end(), made.edges[e]);
-    const double volume = is_link ? length * length * length / 6 : around[e];
+    const bool is_link = std::binary_search(mesh.links().begin(), mesh.links().end(), edge);
+    const double volume = is_link ? length * length * length / 6 : volume_around(edge[0], edge[1]);
     made.length.push_back(length);
     made.distance_compliance.push_back(volume > 0 ? length * length / (stiffness.distance * volume) : kNone);
   }
@@ -139,15 +183,15 @@ void project_volume(std::array<Vec3*, 4> x, std::array<double, 4> w, double volu
   project<4>(x, w, {-of_1 - of_2 - of_3, of_1, of_2, of_3}, a.dot(of_1) - volume, compliance, multiplier);
 }
 
-double elastic_energy(const Mesh& mesh, const Constraints& constraints, std::span<const Vec3> x) {
+double elastic_energy(const Sweep& sweep, const Constraints& constraints, std::span<const Vec3> x) {
   double energy = 0;
-  for (std::size_t e = 0; e < constraints.edges.size(); ++e) {
-    const auto [a, b] = constraints.edges[e];
+  for (std::size_t e = 0; e < sweep.edges.size(); ++e) {
+    const auto [a, b] = sweep.edges[e];
     const double c = (x[at(b)] - x[at(a)]).norm() - constraints.length[e];
     energy += c * c / (2 * constraints.distance_compliance[e]);
   }
-  for (std::size_t t = 0; t < constraints.volume.size(); ++t) {
-    const Tetrahedron& i = mesh.tetrahedra()[t];
+  for (std::size_t t = 0; t < sweep.cells.size(); ++t) {
+    const Tetrahedron& i = sweep.cells[t];
     const double c = volume_of(x[at(i[0])], x[at(i[1])], x[at(i[2])], x[at(i[3])]) - constraints.volume[t];
     energy += c * c / (2 * constraints.volume_compliance[t]);
   }
@@ -183,25 +227,6 @@ std::vector<Crossing> crossings(const Mesh& mesh, std::span<const Vec3> x, const
   }
   return found;
 }
-
-template <std::size_t N>
-std::vector<int32_t> colours_of(const std::vector<std::array<int32_t, N>>& constraints, int32_t vertices) {
-  std::vector<std::vector<bool>> is_taken(at(vertices));  // of each vertex: which colours its constraints have
-  std::vector<int32_t> colours;
-  for (const auto& constraint : constraints) {
-    std::size_t colour = 0;
-    const auto is_free = [&](int32_t i) { return colour >= is_taken[at(i)].size() || !is_taken[at(i)][colour]; };
-    while (!std::all_of(constraint.begin(), constraint.end(), is_free)) ++colour;
-    for (const int32_t i : constraint) {
-      if (is_taken[at(i)].size() <= colour) is_taken[at(i)].resize(colour + 1);
-      is_taken[at(i)][colour] = true;
-    }
-    colours.push_back(static_cast<int32_t>(colour));
-  }
-  return colours;
-}
-template std::vector<int32_t> colours_of(const std::vector<std::array<int32_t, 2>>&, int32_t);
-template std::vector<int32_t> colours_of(const std::vector<std::array<int32_t, 4>>&, int32_t);
 
 namespace {
 
@@ -264,7 +289,8 @@ class Cpu : public Simulator {
  private:
   // What follows from the mesh.
   void build() {
-    constraints_ = constraints_of(mesh_, stiffness_);
+    sweep_ = sweep_of(mesh_);
+    constraints_ = constraints_of(mesh_, sweep_, stiffness_);
     mass_ = masses_of(mesh_, density_, alone_);
     hold_new(mesh_, held_);
     inverse_mass_.resize(mass_.size());
@@ -278,15 +304,15 @@ class Cpu : public Simulator {
     for (std::size_t i = 0; i < x_.size(); ++i) {
       if (inverse_mass_[i] > 0) x_[i] += dt * (v_[i] = decay * (v_[i] + dt * gravity_));
     }
-    std::vector<double> of_edge(constraints_.edges.size()), of_cell(constraints_.volume.size());
+    std::vector<double> of_edge(sweep_.edges.size()), of_cell(sweep_.cells.size());
     for (int iteration = 0; iteration < iterations_; ++iteration) {
       for (std::size_t e = 0; e < of_edge.size(); ++e) {
-        const auto [a, b] = constraints_.edges[e];
+        const auto [a, b] = sweep_.edges[e];
         project_distance({&x_[at(a)], &x_[at(b)]}, {inverse_mass_[at(a)], inverse_mass_[at(b)]}, constraints_.length[e],
                          constraints_.distance_compliance[e] * per_time, of_edge[e]);
       }
       for (std::size_t c = 0; c < of_cell.size(); ++c) {
-        const Tetrahedron& t = mesh_.tetrahedra()[c];
+        const Tetrahedron& t = sweep_.cells[c];
         std::array<Vec3*, 4> x{};
         std::array<double, 4> w{};
         for (std::size_t k = 0; k < 4; ++k) x[k] = &x_[at(t[k])], w[k] = inverse_mass_[at(t[k])];
@@ -304,6 +330,7 @@ class Cpu : public Simulator {
   std::vector<double> alone_;
   std::vector<uint8_t> held_;
   std::vector<Vec3> x_, v_;
+  Sweep sweep_;
   Constraints constraints_;
   std::vector<double> mass_, inverse_mass_;
 };
