@@ -68,7 +68,7 @@ class Mesh {
     double volume;  // a quarter of the tetrahedron's [m³]
   };
   // Marks edges and splits what they part. Returns what new tetrahedra give to vertices on edges: of vertices that are
-  // new all of their mass, of others some. New tetrahedra inherit marks, so call it again until it returns nothing.
+  // new all of their mass, of others some. What is new may be cut as well, so call it again until it returns nothing.
   std::vector<Part> cut(const std::vector<Crossing>& crossings);
 
  private:
@@ -77,6 +77,7 @@ class Mesh {
     std::array<int32_t, 2> vertex = {-1, -1};  // on the side of each end
   };
   bool is_marked(int32_t a, int32_t b) const { return marks_.find(edge_of(a, b)) != marks_.end(); }
+  bool is_cut(int32_t a, int32_t b) const;
   std::array<int, 4> parts_of(const Tetrahedron& tetrahedron) const;
   void split(const Tetrahedron& whole, const std::array<int, 4>& part, std::vector<Tetrahedron>& pieces,
              std::vector<Part>& given);
@@ -87,11 +88,12 @@ class Mesh {
   std::vector<Vec3> rest_;
   std::vector<int32_t> parent_;
   std::vector<Edge> ends_;
+  std::vector<int32_t> particle_;  // [size] at the end of the chain of parents
   std::vector<Tetrahedron> tetrahedra_;
   std::vector<double> volume_;
   std::vector<Edge> links_, edges_;
   std::map<Edge, Mark> marks_;
-  std::vector<Edge> inherited_;  // marks that cells have got since they were looked at
+  std::vector<uint8_t> is_new_;  // [tetrahedra] split off and not looked at yet
 };
 
 // After a cut: places of vertices, or their velocities, for `old` ones. A new vertex lies where the tetrahedron has that
@@ -103,7 +105,7 @@ std::vector<Vec3> after_cut(const Mesh& mesh, const std::vector<Mesh::Part>& par
 
 inline Mesh::Mesh(const Scene& scene)
     : particles_(static_cast<int32_t>(scene.rest.size())), rest_(scene.rest), parent_(scene.rest.size(), -1) {
-  for (int32_t i = 0; i < particles_; ++i) ends_.push_back({i, i});
+  for (int32_t i = 0; i < particles_; ++i) ends_.push_back({i, i}), particle_.push_back(i);
   for (Tetrahedron t : scene.tetrahedra) {
     for (const int32_t i : t) {
       if (i < 0 || i >= particles_) throw std::invalid_argument("a tetrahedron has a corner that is no particle");
@@ -113,6 +115,7 @@ inline Mesh::Mesh(const Scene& scene)
     if (volume < 0) std::swap(t[0], t[1]);
     tetrahedra_.push_back(t);
     volume_.push_back(std::abs(volume));
+    is_new_.push_back(0);
   }
   // What lies in a cube, its tetrahedra hold.
   std::map<Edge, bool> held;
@@ -158,7 +161,14 @@ inline std::vector<int32_t> Mesh::nearest_particles() const {
   return nearest;
 }
 
-// A number for each corner: equal where edges without a mark join them.
+// A blade that passes between two particles passes between what is new on their sides, whenever that was split off.
+// Else a blade would forget what it has swept of a cell that another one splits before it comes to the cell's end.
+inline bool Mesh::is_cut(int32_t a, int32_t b) const {
+  const int32_t of_a = particle_[static_cast<std::size_t>(a)], of_b = particle_[static_cast<std::size_t>(b)];
+  return is_marked(a, b) || (of_a != of_b && is_marked(of_a, of_b));
+}
+
+// A number for each corner: equal where edges join them that are not cut.
 inline std::array<int, 4> Mesh::parts_of(const Tetrahedron& t) const {
   std::array<int, 4> part = {0, 1, 2, 3};
   const auto join = [&](int one, int other) {
@@ -166,7 +176,7 @@ inline std::array<int, 4> Mesh::parts_of(const Tetrahedron& t) const {
   };
   for (const auto& [k, l] : kCornersOfEdges) {
     const auto i = static_cast<std::size_t>(k), j = static_cast<std::size_t>(l);
-    if (!is_marked(t[i], t[j])) join(part[i], part[j]);
+    if (!is_cut(t[i], t[j])) join(part[i], part[j]);
   }
   return part;
 }
@@ -176,6 +186,7 @@ inline int32_t Mesh::new_vertex(const Edge& edge, double share, int32_t parent) 
   rest_.push_back((1 - share) * a + share * b);
   parent_.push_back(parent);
   ends_.push_back(edge);
+  particle_.push_back(particle_[static_cast<std::size_t>(parent)]);
   return size() - 1;
 }
 
@@ -194,7 +205,7 @@ inline void Mesh::split(const Tetrahedron& whole, const std::array<int, 4>& part
     if (part[i] == part[j]) continue;
     const Edge edge = edge_of(whole[i], whole[j]);
     const bool is_ordered = edge[0] == whole[i];
-    points.push_back({edge, marks_.at(edge).share, {part[is_ordered ? i : j], part[is_ordered ? j : i]}});
+    points.push_back({edge, marks_[edge].share, {part[is_ordered ? i : j], part[is_ordered ? j : i]}});
   }
   std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) { return a.edge < b.edge; });
   // A point on an edge is -1 - its number until it is known on which side it is wanted.
@@ -223,7 +234,7 @@ inline void Mesh::split(const Tetrahedron& whole, const std::array<int, 4>& part
       const auto found = std::find(whole.begin(), whole.end(), corner);
       if (found != whole.end()) of = part[static_cast<std::size_t>(found - whole.begin())];
     }
-    Tetrahedron piece = cell, origin = cell;
+    Tetrahedron piece = cell;
     // By edges, not by corners: numbers of new vertices do not depend on how corners are listed.
     std::array<std::size_t, 4> order = {0, 1, 2, 3};
     std::sort(order.begin(), order.end(), [&](std::size_t k, std::size_t l) { return cell[k] > cell[l]; });
@@ -237,7 +248,6 @@ inline void Mesh::split(const Tetrahedron& whole, const std::array<int, 4>& part
         for (std::size_t l = 0; l < 4; ++l) parent = part[l] == of ? std::min(parent, whole[l]) : parent;
         if (is_new) known->second = new_vertex(point.edge, point.share, parent);
         corner = known->second;
-        origin[k] = parent;
         continue;
       }
       const std::size_t side = of == point.part[0] ? 0 : 1;
@@ -246,18 +256,6 @@ inline void Mesh::split(const Tetrahedron& whole, const std::array<int, 4>& part
       if (vertex < 0 || is_marked(vertex, point.edge[side]))
         vertex = new_vertex(point.edge, point.share, point.edge[side]);
       corner = vertex;
-      origin[k] = point.edge[side];
-    }
-    // A blade that has passed between two corners has passed between what is new on their sides.
-    for (const auto& [k, l] : kCornersOfEdges) {
-      const auto i = static_cast<std::size_t>(k), j = static_cast<std::size_t>(l);
-      if (piece[i] == origin[i] && piece[j] == origin[j]) continue;
-      const auto mark = marks_.find(edge_of(origin[i], origin[j]));
-      if (origin[i] == origin[j] || mark == marks_.end()) continue;
-      const bool is_turned = (origin[i] < origin[j]) != (piece[i] < piece[j]);
-      const double share = is_turned ? 1 - mark->second.share : mark->second.share;
-      const Edge edge = edge_of(piece[i], piece[j]);
-      if (marks_.try_emplace(edge, Mark{share, {-1, -1}}).second) inherited_.push_back(edge);
     }
     const auto at = [&](std::size_t k) { return rest_[static_cast<std::size_t>(piece[k])]; };
     const double volume = volume_of(at(0), at(1), at(2), at(3));
@@ -268,6 +266,7 @@ inline void Mesh::split(const Tetrahedron& whole, const std::array<int, 4>& part
     }
     pieces.push_back(piece);
     volume_.push_back(volume);
+    is_new_.push_back(1);
   }
 }
 
@@ -280,20 +279,22 @@ inline std::vector<Mesh::Part> Mesh::cut(const std::vector<Crossing>& crossings)
   }
   std::erase_if(links_, [&](const Edge& link) { return is_marked(link[0], link[1]); });
   std::vector<uint8_t> is_met(rest_.size());
-  for (const Crossing& crossing : crossings) inherited_.push_back(crossing.edge);
-  for (const Edge& edge : std::exchange(inherited_, {})) {
-    for (const int32_t end : edge) is_met[static_cast<std::size_t>(end)] = 1;
+  for (const Crossing& crossing : crossings) {
+    for (const int32_t end : crossing.edge) is_met[static_cast<std::size_t>(end)] = 1;
   }
   std::vector<Part> given;
   std::vector<Tetrahedron> pieces;
   const std::vector<double> old_volume = std::exchange(volume_, {});
+  const std::vector<uint8_t> was_new = std::exchange(is_new_, {});
   for (std::size_t c = 0; c < tetrahedra_.size(); ++c) {
     int met = 0;
-    for (const int32_t i : tetrahedra_[c]) met += is_met[static_cast<std::size_t>(i)];
-    const std::array<int, 4> part = met < 2 ? std::array<int, 4>{} : parts_of(tetrahedra_[c]);
+    for (const int32_t i : tetrahedra_[c])
+      met += is_met[static_cast<std::size_t>(i)] | is_met[static_cast<std::size_t>(particle_[static_cast<std::size_t>(i)])];
+    const std::array<int, 4> part = met < 2 && was_new[c] == 0 ? std::array<int, 4>{} : parts_of(tetrahedra_[c]);
     if (part == std::array<int, 4>{}) {
       pieces.push_back(tetrahedra_[c]);
       volume_.push_back(old_volume[c]);
+      is_new_.push_back(0);
     } else {
       split(tetrahedra_[c], part, pieces, given);
     }
