@@ -86,8 +86,8 @@ void project_volume(std::array<Vec3*, 4> x, std::array<double, 4> w, double volu
 // Energy of the constraints [J].
 double elastic_energy(const Sweep& sweep, const Constraints& constraints, std::span<const Vec3> x);
 
-// Which edges the patch crosses where vertices lie at `x`. A new vertex that is nearer to the blade than `thickness` [m]
-// counts as on the side of its parent: a blade that comes again along a cut takes nothing off. A point in the plane
+// Which edges the patch crosses where vertices lie at `x`. A new vertex that is nearer to the blade than `thickness`
+// [m] counts as on the side of its parent: a blade that comes again along a cut takes nothing off. A point in the plane
 // counts as on the positive side, and borders belong to the patch.
 std::vector<Crossing> crossings(const Mesh& mesh, std::span<const Vec3> x, const Patch& patch, double thickness);
 

@@ -24,7 +24,8 @@ Parameters tets_parameters(const char* text) {
     const double value = parameters(name);
     return value >= 1 && value <= 1e6 && value == std::floor(value);
   };
-  require("youngs_modulus", parameters("youngs_modulus") >= 0, "a modulus in Pa, or 0 for 2e7 times the spacing squared");
+  require("youngs_modulus", parameters("youngs_modulus") >= 0,
+          "a modulus in Pa, or 0 for 2e7 times the spacing squared");
   require("poisson_ratio", parameters("poisson_ratio") >= 0.25 && parameters("poisson_ratio") < 0.5,
           "a ratio from 0.25 to below 0.5, because distances alone have 0.25");
   require("density", parameters("density") >= 0, "a density in kg/m³, or 0 for the masses of the scene");

@@ -5,8 +5,8 @@
 // and six leave three and four parts. Until then it stays whole: the end of a cut lies on faces of whole cells, and the
 // vertices that are new there hang on their edges.
 //
-// A part gets vertices of its own on the edges that are cut: one for each edge and side, shared by all tetrahedra there.
-// So parts of two sides have no vertex in common, whatever the order of cuts.
+// A part gets vertices of its own on the edges that are cut: one for each edge and side, shared by all tetrahedra
+// there. So parts of two sides have no vertex in common, whatever the order of cuts.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -96,9 +96,9 @@ class Mesh {
   std::vector<uint8_t> is_new_;  // [tetrahedra] split off and not looked at yet
 };
 
-// After a cut: places of vertices, or their velocities, for `old` ones. A new vertex lies where the tetrahedron has that
-// point. One that was there before, and gains mass, takes the mean by mass. So a cut moves neither the total momentum
-// nor the centre of mass.
+// After a cut: places of vertices, or their velocities, for `old` ones. A new vertex lies where the tetrahedron has
+// that point. One that was there before, and gains mass, takes the mean by mass. So a cut moves neither the total
+// momentum nor the centre of mass.
 std::vector<Vec3> after_cut(const Mesh& mesh, const std::vector<Mesh::Part>& parts, const std::vector<Vec3>& old);
 
 // --- Implementation --------------------------------------------------------------------------------------------------
@@ -274,8 +274,7 @@ inline std::vector<Mesh::Part> Mesh::cut(const std::vector<Crossing>& crossings)
   for (const Crossing& crossing : crossings) {
     Mark& mark = marks_[crossing.edge];
     // Where there are vertices its place is fixed.
-    if (mark.vertex[0] < 0 && mark.vertex[1] < 0)
-      mark.share = std::clamp(crossing.share, kLeastShare, 1 - kLeastShare);
+    if (mark.vertex[0] < 0 && mark.vertex[1] < 0) mark.share = std::clamp(crossing.share, kLeastShare, 1 - kLeastShare);
   }
   std::erase_if(links_, [&](const Edge& link) { return is_marked(link[0], link[1]); });
   std::vector<uint8_t> is_met(rest_.size());
@@ -289,7 +288,8 @@ inline std::vector<Mesh::Part> Mesh::cut(const std::vector<Crossing>& crossings)
   for (std::size_t c = 0; c < tetrahedra_.size(); ++c) {
     int met = 0;
     for (const int32_t i : tetrahedra_[c])
-      met += is_met[static_cast<std::size_t>(i)] | is_met[static_cast<std::size_t>(particle_[static_cast<std::size_t>(i)])];
+      met += is_met[static_cast<std::size_t>(i)] |
+             is_met[static_cast<std::size_t>(particle_[static_cast<std::size_t>(i)])];
     const std::array<int, 4> part = met < 2 && was_new[c] == 0 ? std::array<int, 4>{} : parts_of(tetrahedra_[c]);
     if (part == std::array<int, 4>{}) {
       pieces.push_back(tetrahedra_[c]);
