@@ -17,7 +17,7 @@ namespace cutproof::baselines {
 // The parameters of this method with their defaults. Throws std::invalid_argument with a sentence that names what is
 // wrong: unknown names, values out of range.
 //   youngs_modulus  0: 2e7 spacing², so that a scene of any spacing bends alike
-//   poisson_ratio   from 0.25 to below 0.5: distances alone have 0.25
+//   poisson_ratio   from 0 to below 0.5. Distances alone have 1/4: for less, the material has 1/4 and the same modulus
 //   density         0: the scene's total mass over the volume of its tetrahedra
 //   steps           substeps in a frame
 //   iterations      sweeps over all constraints in a substep
@@ -41,7 +41,7 @@ struct Stiffness {
 };
 // Such that bulk modulus and shear modulus, as means over all directions (Voigt), are those of the material. Six
 // directions n of equal share S / 6 have the elastic tensor (S / 6) sum n n n n, of bulk modulus S / 9 and mean shear
-// modulus S / 15. So S = 15 G, and the volume adds K - 5 G / 3, which is none at a ratio of 1/4.
+// modulus S / 15. So S = 15 G, and the volume adds K - 5 G / 3, which is none at a ratio of 1/4 and for less.
 Stiffness stiffness_of(double youngs_modulus, double poisson_ratio);
 
 // The order in which a substep visits constraints: by colours, so that those of a colour have no vertex in common and

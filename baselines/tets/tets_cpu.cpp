@@ -26,8 +26,8 @@ Parameters tets_parameters(const char* text) {
   };
   require("youngs_modulus", parameters("youngs_modulus") >= 0,
           "a modulus in Pa, or 0 for 2e7 times the spacing squared");
-  require("poisson_ratio", parameters("poisson_ratio") >= 0.25 && parameters("poisson_ratio") < 0.5,
-          "a ratio from 0.25 to below 0.5, because distances alone have 0.25");
+  require("poisson_ratio", parameters("poisson_ratio") >= 0 && parameters("poisson_ratio") < 0.5,
+          "a ratio from 0 to below 0.5");
   require("density", parameters("density") >= 0, "a density in kg/m³, or 0 for the masses of the scene");
   require("steps", is_count("steps"), "a whole number from 1 to 1000000");
   require("iterations", is_count("iterations"), "a whole number from 1 to 1000000");
@@ -57,8 +57,9 @@ void project(const std::array<Vec3*, N>& x, const std::array<double, N>& w, cons
 }  // namespace
 
 Stiffness stiffness_of(double youngs_modulus, double poisson_ratio) {
+  poisson_ratio = std::max(poisson_ratio, 0.25);
   const double shear = youngs_modulus / (2 * (1 + poisson_ratio)), bulk = youngs_modulus / (3 - 6 * poisson_ratio);
-  return {15 * shear / 6, std::max(bulk - 5 * shear / 3, 0.0)};
+  return {15 * shear / 6, poisson_ratio > 0.25 ? bulk - 5 * shear / 3 : 0};
 }
 
 template <std::size_t N>
@@ -239,7 +240,7 @@ class Cpu : public Simulator {
         steps_(static_cast<int>(parameters("steps"))),
         iterations_(static_cast<int>(parameters("iterations"))),
         damping_(parameters("damping")),
-        thickness_(kLeastShare * scene.spacing),
+        thickness_(kThickness * scene.spacing),
         density_(parameters("density") > 0 ? parameters("density") : density_of(scene, mesh_)),
         gravity_(scene.gravity),
         alone_(scene.mass),

@@ -80,7 +80,7 @@ class Kernels : public Simulator {
         steps_(static_cast<int>(parameters("steps"))),
         iterations_(static_cast<int>(parameters("iterations"))),
         damping_(parameters("damping")),
-        thickness_(kLeastShare * scene.spacing),
+        thickness_(kThickness * scene.spacing),
         density_(parameters("density") > 0 ? parameters("density") : density_of(scene, mesh_)),
         gravity_(narrow(scene.gravity)),
         alone_(scene.mass),

@@ -30,6 +30,9 @@ using Tetrahedron = std::array<int32_t, 4>;  // (x₁ - x₀) × (x₂ - x₀) �
 inline constexpr int kCornersOfEdges[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 // A cut passes an edge no nearer to an end than this share of its length: thinner slices have no useful mass.
 inline constexpr double kLeastShare = 0.1;
+// How near to a blade a new vertex counts as on its surface [spacings]: more than the tenth of a cube's diagonal by
+// which it may have been moved.
+inline constexpr double kThickness = 0.2;
 
 inline Edge edge_of(int32_t a, int32_t b) { return {std::min(a, b), std::max(a, b)}; }
 // Signed volume [m³].
@@ -118,18 +121,19 @@ inline Mesh::Mesh(const Scene& scene)
     is_new_.push_back(0);
   }
   // What lies in a cube, its tetrahedra hold.
-  std::map<Edge, bool> held;
+  std::vector<Edge> held;
   const auto hold = [&](const auto& corners) {
     for (std::size_t k = 0; k < corners.size(); ++k) {
-      for (std::size_t l = 0; l < k; ++l) held[edge_of(corners[k], corners[l])] = true;
+      for (std::size_t l = 0; l < k; ++l) held.push_back(edge_of(corners[k], corners[l]));
     }
   };
   for (const auto& cell : scene.tetrahedra) hold(cell);
   if (!scene.tetrahedra.empty()) {
     for (const auto& cube : scene.hexahedra) hold(cube);
   }
-  for (const Edge& edge : scene.edges) {
-    if (held.emplace(edge_of(edge[0], edge[1]), true).second) links_.push_back(edge_of(edge[0], edge[1]));
+  std::sort(held.begin(), held.end());
+  for (const auto& [a, b] : scene.edges) {
+    if (!std::binary_search(held.begin(), held.end(), edge_of(a, b))) links_.push_back(edge_of(a, b));
   }
   std::sort(links_.begin(), links_.end());
   list_edges();
