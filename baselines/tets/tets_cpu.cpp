@@ -1,5 +1,6 @@
 // The method in double precision: Gauss-Seidel, colour by colour. It is the oracle of the kernels.
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -64,17 +65,22 @@ Stiffness stiffness_of(double youngs_modulus, double poisson_ratio) {
 
 template <std::size_t N>
 std::vector<int32_t> colours_of(const std::vector<std::array<int32_t, N>>& constraints, int32_t vertices) {
-  std::vector<std::vector<bool>> is_taken(at(vertices));  // of each vertex: which colours its constraints have
+  std::vector<std::vector<uint64_t>> taken(at(vertices));  // of each vertex: a bit for each colour
   std::vector<int32_t> colours;
   for (const auto& constraint : constraints) {
-    std::size_t colour = 0;
-    const auto is_free = [&](int32_t i) { return colour >= is_taken[at(i)].size() || !is_taken[at(i)][colour]; };
-    while (!std::all_of(constraint.begin(), constraint.end(), is_free)) ++colour;
+    std::size_t word = 0;
+    const auto free = [&] {
+      uint64_t all = 0;
+      for (const int32_t i : constraint) all |= word < taken[at(i)].size() ? taken[at(i)][word] : 0;
+      return ~all;
+    };
+    while (free() == 0) ++word;
+    const int bit = std::countr_zero(free());
     for (const int32_t i : constraint) {
-      if (is_taken[at(i)].size() <= colour) is_taken[at(i)].resize(colour + 1);
-      is_taken[at(i)][colour] = true;
+      if (taken[at(i)].size() <= word) taken[at(i)].resize(word + 1);
+      taken[at(i)][word] |= uint64_t{1} << bit;
     }
-    colours.push_back(static_cast<int32_t>(colour));
+    colours.push_back(static_cast<int32_t>(64 * word) + bit);
   }
   return colours;
 }
@@ -88,13 +94,14 @@ template <class T>
 std::vector<std::size_t> sort_by_colour(std::vector<T>& constraints, int32_t vertices) {
   const std::vector<int32_t> colours = colours_of(constraints, vertices);
   std::vector<std::size_t> starts = {0};
-  std::vector<T> sorted;
-  for (int32_t colour = 0; sorted.size() < constraints.size(); ++colour) {
-    for (std::size_t k = 0; k < constraints.size(); ++k) {
-      if (colours[k] == colour) sorted.push_back(constraints[k]);
-    }
-    starts.push_back(sorted.size());
+  for (const int32_t colour : colours) {
+    if (starts.size() < at(colour) + 2) starts.resize(at(colour) + 2);
+    ++starts[at(colour) + 1];
   }
+  for (std::size_t k = 1; k < starts.size(); ++k) starts[k] += starts[k - 1];
+  std::vector<std::size_t> next = starts;
+  std::vector<T> sorted(constraints.size());
+  for (std::size_t k = 0; k < constraints.size(); ++k) sorted[next[at(colours[k])]++] = constraints[k];
   constraints = std::move(sorted);
   return starts;
 }
@@ -111,10 +118,7 @@ Sweep sweep_of(const Mesh& mesh) {
 Constraints constraints_of(const Mesh& mesh, const Sweep& sweep, const Stiffness& stiffness) {
   Constraints made;
   std::vector<double> around(mesh.edges().size());  // m³
-  const auto volume_around = [&](int32_t a, int32_t b) -> double& {
-    const auto found = std::lower_bound(mesh.edges().begin(), mesh.edges().end(), edge_of(a, b));
-    return around[static_cast<std::size_t>(found - mesh.edges().begin())];
-  };
+  const auto volume_around = [&](int32_t a, int32_t b) -> double& { return around[mesh.edge_number(a, b)]; };
   const auto rest = [&](int32_t i) { return mesh.rest()[at(i)]; };
   for (const Tetrahedron& t : sweep.cells) {
     const double volume = volume_of(rest(t[0]), rest(t[1]), rest(t[2]), rest(t[3]));

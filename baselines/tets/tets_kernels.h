@@ -221,17 +221,15 @@ class Kernels : public Simulator {
     });
 
     // Cells around edges, by the edges' numbers in the sweep.
-    std::vector<std::pair<Edge, int32_t>> numbers;
-    for (const Edge& edge : sweep_.edges) numbers.emplace_back(edge, static_cast<int32_t>(numbers.size()));
-    std::sort(numbers.begin(), numbers.end());
+    std::vector<std::size_t> number(sweep_.edges.size());
+    for (std::size_t e = 0; e < number.size(); ++e)
+      number[mesh_.edge_number(sweep_.edges[e][0], sweep_.edges[e][1])] = e;
     const auto each_edge = [&](const auto& add) {
       for (std::size_t c = 0; c < sweep_.cells.size(); ++c) {
-        for (const auto& [k, l] : kCornersOfEdges) {
-          const Tetrahedron& t = sweep_.cells[c];
-          const Edge edge = edge_of(t[static_cast<std::size_t>(k)], t[static_cast<std::size_t>(l)]);
-          const auto found = std::lower_bound(numbers.begin(), numbers.end(), std::pair(edge, int32_t{-1}));
-          add(static_cast<std::size_t>(found->second), static_cast<int32_t>(c));
-        }
+        const Tetrahedron& t = sweep_.cells[c];
+        for (const auto& [k, l] : kCornersOfEdges)
+          add(number[mesh_.edge_number(t[static_cast<std::size_t>(k)], t[static_cast<std::size_t>(l)])],
+              static_cast<int32_t>(c));
       }
     };
     const Around of_edge = around(sweep_.edges.size(), each_edge);
