@@ -71,7 +71,8 @@ Element element_of(const Corners& rest) {
         sign[k] = 2 * kEnds[a][k] - 1;
         factor[k] = (1 + sign[k] * (2 * kEnds[g][k] - 1) / std::sqrt(3.0)) / 2;
       }
-      slopes.row(a) << sign[0] * factor[1] * factor[2], sign[1] * factor[2] * factor[0], sign[2] * factor[0] * factor[1];
+      slopes.row(a) << sign[0] * factor[1] * factor[2], sign[1] * factor[2] * factor[0],
+          sign[2] * factor[0] * factor[1];
     }
     slopes /= 2;
     const Matrix3d jacobian = rest.transpose() * slopes;  // ∂X/∂ξ
@@ -138,8 +139,10 @@ Linearised linearise(const Element& element, Lame lame, const Corners& x, bool p
     const auto& [rotation, axes, stretch] = points[g].polar;
     const double volume = element.volumes[g];
     const Corners turned = gradients * rotation.transpose();
-    const Corners force = gradients * (points[g].f - rotation).transpose() * (2 * lame.mu) + turned * lame.lambda * mean;
-    // F changes by dF, so R by R [ω]ₓ with (tr(S) I − S) ω = τ, the axial vector of Rᵀ dF − dFᵀ R. The stress 2 μ (F − R)
+    const Corners force =
+        gradients * (points[g].f - rotation).transpose() * (2 * lame.mu) + turned * lame.lambda * mean;
+    // F changes by dF, so R by R [ω]ₓ with (tr(S) I − S) ω = τ, the axial vector of Rᵀ dF − dFᵀ R. The stress 2 μ (F −
+    // R)
     // + λ θ̄ R changes by 2 μ dF − c dR + .., c = 2 μ − λ θ̄, and dF : dR = τ · ω. Along an axis of ω the eigenvalue is
     // 2 μ − 2 c / (sum of the other two stretches).
     const double c = 2 * lame.mu - lame.lambda * mean;
@@ -173,7 +176,8 @@ double energy_of(const Mesh& mesh, Lame lame, const Vec3& gravity, const Frame& 
   double energy = 0;
   for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
     if (mesh.is_removed[c] == 0)
-      energy += energy_of(element_of(corners_of(mesh.rest, mesh.cells[c])), lame, corners_of(frame.position, mesh.cells[c]));
+      energy +=
+          energy_of(element_of(corners_of(mesh.rest, mesh.cells[c])), lame, corners_of(frame.position, mesh.cells[c]));
   }
   const std::vector<double> mass = lumped_mass(mesh);
   for (std::size_t i = 0; i < mass.size(); ++i) {
@@ -218,8 +222,8 @@ class Component {
     }
   }
 
-  // Solves (diagonal + scale · K) Δ = b. `diagonal` and `b` are [p], of which those of this component are used; `of_cell`
-  // gives K of a cell.
+  // Solves (diagonal + scale · K) Δ = b. `diagonal` and `b` are [p], of which those of this component are used;
+  // `of_cell` gives K of a cell.
   template <class OfCell>
   void solve(const Mesh& mesh, const std::vector<int32_t>& local, const Settings& settings, const OfCell& of_cell,
              double scale, const std::vector<double>& diagonal, const std::vector<Vec3>& b, std::vector<Vec3>& delta) {
@@ -282,8 +286,8 @@ class Component {
 // Components of a mesh with cells. `local` as in prepare().
 std::vector<Component> components_of(const Mesh& mesh, std::vector<int32_t>& local) {
   const std::vector<int32_t> number = node_components(mesh);
-  std::vector<Component> all(number.empty() ? 0
-                                            : static_cast<std::size_t>(*std::max_element(number.begin(), number.end())) + 1);
+  std::vector<Component> all(
+      number.empty() ? 0 : static_cast<std::size_t>(*std::max_element(number.begin(), number.end())) + 1);
   for (std::size_t i = 0; i < number.size(); ++i)
     all[static_cast<std::size_t>(number[i])].nodes.push_back(static_cast<int32_t>(i));
   for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
@@ -316,7 +320,7 @@ class Cpu : public Simulator {
     for (std::size_t i = 0; i < v_.size(); ++i) {
       if (mesh_.held[i] != 0) v_[i].setZero();
     }
-    split_nodes();  // cells that only an edge or a node joins are no tissue
+    prepare();
   }
 
   int substeps() const override { return settings_.steps; }
@@ -329,6 +333,8 @@ class Cpu : public Simulator {
   }
 
   void advance(double frame_time) override {
+    // Cells that only an edge or a node joins are no tissue. A run begins with the particles of its scene.
+    if (++frames_ == 1) split_nodes();
     const double dt = frame_time / settings_.steps;
     for (int step = 0; step < settings_.steps; ++step) {
       for (Component& component : components_) move(component, dt);
@@ -369,7 +375,7 @@ class Cpu : public Simulator {
   }
 
   Frame frame(bool changed) const override {
-    Frame frame = frame_of(mesh_, changed);
+    Frame frame = frame_of(mesh_, changed || frames_ == 1);
     frame.position = x_;
     frame.velocity = v_;
     return frame;
@@ -381,12 +387,15 @@ class Cpu : public Simulator {
       x_.push_back(Vec3(x_[static_cast<std::size_t>(parent)]));
       v_.push_back(Vec3(v_[static_cast<std::size_t>(parent)]));
     }
+    prepare();
+  }
+  void prepare() {
     mass_ = lumped_mass(mesh_);
     components_ = components_of(mesh_, local_);
   }
 
-  // One step of implicit Euler for the velocities: M (v − v₀) = dt (f(x + dt v) + M g − D v). Each Newton step linearises
-  // at x + dt w: w = 0 in the first, which is the published step, then w = v.
+  // One step of implicit Euler for the velocities: M (v − v₀) = dt (f(x + dt v) + M g − D v). Each Newton step
+  // linearises at x + dt w: w = 0 in the first, which is the published step, then w = v.
   void move(Component& component, double dt) {
     std::vector<Vec3>& w = linearised_at_;
     for (std::vector<Vec3>* const each : {&delta_, &right_, &start_, &w}) each->resize(x_.size());
@@ -414,8 +423,8 @@ class Cpu : public Simulator {
         stiffness_[c] = linear.stiffness;
       }
       component.solve(
-          mesh_, local_, settings_, [&](std::size_t c) -> const Matrix24& { return stiffness_[c]; }, dt * (dt + b),
-          mass_, right_, delta_);
+          mesh_, local_, settings_, [&](std::size_t c) -> const Matrix24& { return stiffness_[c]; }, dt*(dt + b), mass_,
+          right_, delta_);
       for (const int32_t node : component.nodes) {
         const auto i = static_cast<std::size_t>(node);
         v_[i] += delta_[i];
@@ -428,6 +437,7 @@ class Cpu : public Simulator {
   Lame lame_;
   Vec3 gravity_;
   Mesh mesh_;
+  int frames_ = 0;
   std::vector<Vec3> x_, v_;  // [p] m, m/s
   std::vector<double> mass_;
   std::vector<Element> elements_;
@@ -463,12 +473,11 @@ std::vector<Vec3> equilibrium(const Mesh& mesh, Lame lame, const std::vector<Vec
       for (const int32_t c : component.cells) {
         const auto& cell = mesh.cells[static_cast<std::size_t>(c)];
         linear.push_back(linearise(elements[static_cast<std::size_t>(c)], lame, corners_of(x, cell)));
-        for (int a = 0; a < 8; ++a)
-          right[static_cast<std::size_t>(cell[a])] += linear.back().force.segment<3>(3 * a);
+        for (int a = 0; a < 8; ++a) right[static_cast<std::size_t>(cell[a])] += linear.back().force.segment<3>(3 * a);
       }
       component.solve(
-          mesh, local, Settings(), [&](std::size_t c) -> const Matrix24& { return linear[c].stiffness; }, 1, none, right,
-          delta);
+          mesh, local, Settings(), [&](std::size_t c) -> const Matrix24& { return linear[c].stiffness; }, 1, none,
+          right, delta);
       double slope = 0, size = 0, farthest = 0;
       for (const int32_t node : component.nodes) {
         const auto i = static_cast<std::size_t>(node);

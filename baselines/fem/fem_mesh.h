@@ -20,21 +20,22 @@ using Corners = Eigen::Matrix<double, 8, 3>;  // places of a cell's corners in V
 inline constexpr int kEnds[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
                                     {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
 // Corners of its faces and edges.
-inline constexpr int kFaces[6][4] = {{0, 1, 2, 3}, {4, 5, 6, 7}, {0, 1, 5, 4}, {3, 2, 6, 7}, {0, 3, 7, 4}, {1, 2, 6, 5}};
+inline constexpr int kFaces[6][4] = {{0, 1, 2, 3}, {4, 5, 6, 7}, {0, 1, 5, 4},
+                                     {3, 2, 6, 7}, {0, 3, 7, 4}, {1, 2, 6, 5}};
 inline constexpr int kEdges[12][2] = {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {4, 5}, {5, 6},
                                       {6, 7}, {7, 4}, {0, 4}, {1, 5}, {2, 6}, {3, 7}};
 inline constexpr int kDiagonals[4][2] = {{0, 6}, {1, 7}, {2, 4}, {3, 5}};
 
 struct Mesh {
-  std::vector<std::array<int32_t, 8>> cells;  // [c] nodes in VTK's order
-  std::vector<double> cell_mass;              // [c] kg
-  std::vector<uint8_t> is_removed;            // [c]
-  std::vector<std::array<int32_t, 2>> links;  // [l] cells that share a face, the lower one first
-  std::vector<uint8_t> is_cut;                // [l]
-  std::vector<Vec3> rest;                     // [p] m; the first n nodes are the scene's particles
-  std::vector<double> own_mass;               // [p] kg of particles in no cell; otherwise 0
-  std::vector<uint8_t> held;                  // [p]
-  std::vector<int32_t> parent;                // [p] the node that one was split from, or -1
+  std::vector<std::array<int32_t, 8>> cells;                    // [c] nodes in VTK's order
+  std::vector<double> cell_mass;                                // [c] kg
+  std::vector<uint8_t> is_removed;                              // [c]
+  std::vector<std::array<int32_t, 2>> links;                    // [l] cells that share a face, the lower one first
+  std::vector<uint8_t> is_cut;                                  // [l]
+  std::vector<Vec3> rest;                                       // [p] m; the first n nodes are the scene's particles
+  std::vector<double> own_mass;                                 // [p] kg of particles in no cell; otherwise 0
+  std::vector<uint8_t> held;                                    // [p]
+  std::vector<int32_t> parent;                                  // [p] the node that one was split from, or -1
   std::vector<std::vector<std::pair<int32_t, double>>> shares;  // [nodes at the start] particles, weights; sum 1
 };
 
@@ -106,8 +107,8 @@ inline Mesh mesh_of(const Scene& scene, int refine, double density) {
     for (int k = 0; k < refine * refine * refine; ++k) {
       std::array<int32_t, 8> part;
       for (int a = 0; a < 8; ++a)
-        part[a] = node_at(cell, {k % refine + kEnds[a][0], k / refine % refine + kEnds[a][1],
-                                 k / refine / refine + kEnds[a][2]});
+        part[a] = node_at(
+            cell, {k % refine + kEnds[a][0], k / refine % refine + kEnds[a][1], k / refine / refine + kEnds[a][2]});
       mesh.cells.push_back(part);
     }
   }
@@ -121,7 +122,8 @@ inline Mesh mesh_of(const Scene& scene, int refine, double density) {
   for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
     mesh.cell_mass.push_back(volume_of(corners_of(mesh.rest, mesh.cells[c])));
     if (!(mesh.cell_mass.back() > 0))
-      throw std::invalid_argument("hexahedron " + std::to_string(c / static_cast<std::size_t>(refine * refine * refine)) +
+      throw std::invalid_argument("hexahedron " +
+                                  std::to_string(c / static_cast<std::size_t>(refine * refine * refine)) +
                                   " has no volume at rest, or corners in another order than VTK's; correct it");
     volume += mesh.cell_mass.back();
   }
@@ -183,7 +185,8 @@ inline std::vector<int32_t> split(Mesh& mesh) {
   std::vector<std::vector<int32_t>> linked(mesh.cells.size());
   for (std::size_t l = 0; l < mesh.links.size(); ++l) {
     const auto [a, b] = mesh.links[l];
-    const bool is_gone = mesh.is_removed[static_cast<std::size_t>(a)] + mesh.is_removed[static_cast<std::size_t>(b)] > 0;
+    const bool is_gone =
+        mesh.is_removed[static_cast<std::size_t>(a)] + mesh.is_removed[static_cast<std::size_t>(b)] > 0;
     if (mesh.is_cut[l] == 0 && !is_gone) linked[static_cast<std::size_t>(a)].push_back(b);
   }
   std::vector<int32_t> parents;
@@ -195,7 +198,8 @@ inline std::vector<int32_t> split(Mesh& mesh) {
     for (auto a = begin; a != end; ++a) {
       for (const int32_t other : linked[static_cast<std::size_t>(*a)]) {
         const auto b = std::lower_bound(begin, end, other);
-        if (b != end && *b == other) joined.push_back({static_cast<int32_t>(a - begin), static_cast<int32_t>(b - begin)});
+        if (b != end && *b == other)
+          joined.push_back({static_cast<int32_t>(a - begin), static_cast<int32_t>(b - begin)});
       }
     }
     const std::vector<int32_t> group = components(static_cast<int32_t>(end - begin), joined);
