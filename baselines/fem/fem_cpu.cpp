@@ -4,6 +4,7 @@
 #include <Eigen/SVD>
 #include <Eigen/Sparse>
 #include <cmath>
+#include <limits>
 
 #include "baselines/fem/fem.h"
 
@@ -217,6 +218,7 @@ class Component {
     constexpr int kLarge = 3000;
     if (unknowns_ > 0) {
       factor_ = std::make_unique<Factor>();
+      factor_->cholmod().print = 0;  // what fails is thrown
       factor_->setMode(unknowns_ < kLarge ? Eigen::CholmodSimplicialLLt : Eigen::CholmodSupernodalLLt);
       factor_->analyzePattern(matrix_);
     }
@@ -466,6 +468,7 @@ std::vector<Vec3> equilibrium(const Mesh& mesh, Lame lame, const std::vector<Vec
       return energy;
     };
     constexpr int kMost = 200;
+    double farthest_before = std::numeric_limits<double>::infinity();
     for (int step = 0;; ++step) {
       if (step == kMost) throw std::runtime_error("no equilibrium was found; apply the load in smaller parts");
       std::vector<Linearised> linear;
@@ -496,7 +499,9 @@ std::vector<Vec3> equilibrium(const Mesh& mesh, Lame lame, const std::vector<Vec
         if (farthest < 1e-6 * size || part < 1e-6 || energy_at(next) <= before - 1e-4 * part * slope) break;
       }
       x = next;
-      if (farthest < 1e-11 * size) break;
+      // Rounding is reached where steps that are tiny no longer shrink.
+      if (farthest < 1e-10 * size && farthest > 0.5 * farthest_before) break;
+      farthest_before = farthest;
     }
   }
   return x;

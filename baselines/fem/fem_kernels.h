@@ -54,12 +54,11 @@ BASELINES_HOST_DEVICE inline Rotation rotation_of(const float* f) {
   }
   int best = 0;
   for (int k = 1; k < 4; ++k) best = n[k][k] > n[best][best] ? k : best;
-  float w = q[0][best], x = q[1][best], y = q[2][best], z = q[3][best];
-  const float scale = 1 / sqrtf(w * w + x * x + y * y + z * z);
-  w *= scale, x *= scale, y *= scale, z *= scale;
-  Rotation result = {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),  //
-                      2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),  //
-                      2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)},
+  const float w = q[0][best], x = q[1][best], y = q[2][best], z = q[3][best];
+  const float d = 2 / (w * w + x * x + y * y + z * z);  // so that rounding of the length does not matter
+  Rotation result = {{1 - d * (y * y + z * z), d * (x * y - w * z), d * (x * z + w * y),  //
+                      d * (x * y + w * z), 1 - d * (x * x + z * z), d * (y * z - w * x),  //
+                      d * (x * z - w * y), d * (y * z + w * x), 1 - d * (x * x + y * y)},
                      {},
                      {},
                      0};
@@ -67,10 +66,10 @@ BASELINES_HOST_DEVICE inline Rotation rotation_of(const float* f) {
   for (int k = 0, axis = 0; k < 4; ++k) {
     if (k == best) continue;
     // The imaginary part of conj(q_best) q_k.
-    const float a = q[0][k], b = q[1][k], c = q[2][k], d = q[3][k];
-    result.axes[axis][0] = w * b - x * a - (y * d - z * c);
-    result.axes[axis][1] = w * c - y * a - (z * b - x * d);
-    result.axes[axis][2] = w * d - z * a - (x * c - y * b);
+    const float e[4] = {q[0][k], q[1][k], q[2][k], q[3][k]};
+    result.axes[axis][0] = w * e[1] - x * e[0] - (y * e[3] - z * e[2]);
+    result.axes[axis][1] = w * e[2] - y * e[0] - (z * e[1] - x * e[3]);
+    result.axes[axis][2] = w * e[3] - z * e[0] - (x * e[2] - y * e[1]);
     result.sums[axis++] = 0.5f * (n[best][best] - n[k][k]);
   }
   return result;
