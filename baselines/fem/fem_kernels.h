@@ -444,6 +444,7 @@ class Kernels : public Simulator {
   // One step of implicit Euler, as in fem_cpu.cpp.
   void move(float dt) {
     const std::size_t nodes = place_.size(), cells = mesh_.cells.size();
+    if (nodes == 0) return;
     const View s = view();
     const auto b = static_cast<float>(settings_.damping);
     const float scale = dt * (dt + b);

@@ -242,11 +242,17 @@ inline std::vector<int32_t> node_components(const Mesh& mesh) {
   return components(static_cast<int32_t>(mesh.rest.size()), pairs);
 }
 
-// What a frame says of topology; nodes whose cells are all removed are dead.
+// What a frame says of topology. Nodes whose cells are all removed are dead, and have the mass of those.
 inline Frame frame_of(const Mesh& mesh, bool changed) {
   Frame frame;
   frame.mass = lumped_mass(mesh);
   for (const double mass : frame.mass) frame.alive.push_back(mass > 0 ? 1 : 0);
+  for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
+    for (const int32_t i : mesh.cells[c]) {
+      if (frame.alive[static_cast<std::size_t>(i)] == 0)
+        frame.mass[static_cast<std::size_t>(i)] += mesh.cell_mass[c] / 8;
+    }
+  }
   frame.parent = mesh.parent;
   frame.has_cells = changed;
   for (std::size_t c = 0; changed && c < mesh.cells.size(); ++c) {
