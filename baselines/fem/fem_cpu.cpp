@@ -5,6 +5,7 @@
 #include <Eigen/Sparse>
 #include <cmath>
 #include <limits>
+#include <sstream>
 
 #include "baselines/fem/fem.h"
 
@@ -29,17 +30,21 @@ std::map<std::string, double> known_parameters() {
 }
 
 Settings settings_of(const Parameters& parameters, double spacing) {
+  const auto refuse = [&](const char* name, const auto&... remedy) {
+    std::ostringstream text;
+    text << "parameter '" << name << "' is " << parameters(name) << "; give ";
+    (text << ... << remedy);
+    throw std::invalid_argument(text.str());
+  };
   const auto within = [&](const char* name, double low, double high) {
     const double value = parameters(name);
-    if (value >= low && value <= high) return value;
-    throw std::invalid_argument("parameter '" + std::string(name) + "' is " + std::to_string(value) +
-                                "; give a number from " + std::to_string(low) + " to " + std::to_string(high));
+    if (!(value >= low && value <= high)) refuse(name, "a number from ", low, " to ", high);
+    return value;
   };
   const auto whole = [&](const char* name, int low, int high) {
     const double value = within(name, low, high);
-    if (value == std::floor(value)) return static_cast<int>(value);
-    throw std::invalid_argument("parameter '" + std::string(name) + "' is " + std::to_string(value) +
-                                "; give a whole number");
+    if (value != std::floor(value)) refuse(name, "a whole number");
+    return static_cast<int>(value);
   };
   Settings s;
   s.youngs_modulus = within("youngs_modulus", 0, 1e15);

@@ -490,6 +490,12 @@ class Kernels : public Simulator {
     executor_.for_each(3 * nodes, [=] BASELINES_KERNEL(int64_t k) { x[k] += dt * v[k]; });
   }
 
+  // The nodes' products, summed over each component: by chunks of it first, so that a large one occupies the device.
+  void sum_up(Array<float>& of_components) {
+    executor_.sums(dots_, chunk_starts_, chunks_);
+    executor_.sums(chunks_, starts_, of_components);
+  }
+
   // Conjugate gradients from delta = 0; r, z, p and the nodes' r · z are set.
   void solve(float scale) {
     const std::size_t nodes = place_.size(), cells = mesh_.cells.size(), components = starts_.size() - 1;
@@ -500,7 +506,7 @@ class Kernels : public Simulator {
     float *const rz = rz_.data(), *const next = next_.data(), *const pq = pq_.data(), *const least = least_.data();
     int32_t* const active = active_.data();
     const auto factor = static_cast<float>(settings_.tolerance * settings_.tolerance);
-    executor_.sums(dots_, starts_, rz_);
+    sum_up(rz_);
     executor_.for_each(components, [=] BASELINES_KERNEL(int64_t k) {
       least[k] = factor * rz[k];
       active[k] = rz[k] > least[k] ? 1 : 0;
@@ -522,7 +528,7 @@ class Kernels : public Simulator {
         }
         dots[i] = dot3(p + 3 * i, q + 3 * i);
       });
-      executor_.sums(dots_, starts_, pq_);
+      sum_up(pq_);
       executor_.for_each(nodes, [=] BASELINES_KERNEL(int64_t i) {
         const int32_t k = s.component[i];
         if (active[k] == 0 || !(pq[k] > 0)) return;
@@ -531,7 +537,7 @@ class Kernels : public Simulator {
         multiply(inverse + 6 * i, r + 3 * i, z + 3 * i);
         dots[i] = dot3(r + 3 * i, z + 3 * i);
       });
-      executor_.sums(dots_, starts_, next_);
+      sum_up(next_);
       executor_.for_each(nodes, [=] BASELINES_KERNEL(int64_t i) {
         const int32_t k = s.component[i];
         if (active[k] == 0) return;
@@ -596,7 +602,8 @@ class Kernels : public Simulator {
     const std::vector<double> mass_of = lumped_mass(mesh_);
     std::vector<float> places, velocities, mass;
     std::vector<uint8_t> fixed;
-    std::vector<int32_t> component, starts = {0};
+    std::vector<int32_t> component, starts, chunk_starts;
+    constexpr int32_t kChunk = 512;
     for (std::size_t k = 0; k < nodes; ++k) {
       const std::size_t i = order[k];
       place_[i] = k;
@@ -608,9 +615,13 @@ class Kernels : public Simulator {
       fixed.push_back(mesh_.held[i] != 0 || !(mass_of[i] > 0) ? 1 : 0);
       if (!(mass_of[i] > 0)) std::fill(velocities.end() - 3, velocities.end(), 0.0f);  // the dead stay
       component.push_back(number[i]);
-      if (k > 0 && number[i] != number[order[k - 1]]) starts.push_back(static_cast<int32_t>(k));
+      const auto place = static_cast<int32_t>(k);
+      const bool is_first = k == 0 || number[i] != number[order[k - 1]];
+      if (is_first) starts.push_back(static_cast<int32_t>(chunk_starts.size()));
+      if (is_first || place - chunk_starts.back() == kChunk) chunk_starts.push_back(place);
     }
-    if (nodes > 0) starts.push_back(static_cast<int32_t>(nodes));
+    starts.push_back(static_cast<int32_t>(chunk_starts.size()));
+    chunk_starts.push_back(static_cast<int32_t>(nodes));
     std::vector<int32_t> corners, offsets(nodes + 1, 0), slots;
     for (const auto& cell : mesh_.cells) {
       for (const int32_t i : cell) corners.push_back(static_cast<int32_t>(place_[static_cast<std::size_t>(i)]));
@@ -628,6 +639,7 @@ class Kernels : public Simulator {
     for (const auto& link : mesh_.links) links.insert(links.end(), link.begin(), link.end());
     x_ = Array<float>(places), v_ = Array<float>(velocities), mass_ = Array<float>(mass);
     fixed_ = Array<uint8_t>(fixed), component_ = Array<int32_t>(component), starts_ = Array<int32_t>(starts);
+    chunk_starts_ = Array<int32_t>(chunk_starts), chunks_ = Array<float>(chunk_starts.size() - 1);
     corners_ = Array<int32_t>(corners), shape_ = Array<int32_t>(shape_of_cell_), links_ = Array<int32_t>(links);
     offsets_ = Array<int32_t>(offsets), slots_ = Array<int32_t>(slots);
     for (Array<float>* const each : {&start_, &w_, &p_, &y_, &r_, &z_, &delta_}) *each = Array<float>(3 * nodes);
@@ -648,8 +660,8 @@ class Kernels : public Simulator {
   Executor executor_;
   Array<float> gradients_, volumes_, mass_, x_, v_;
   Array<uint8_t> fixed_;
-  Array<int32_t> corners_, shape_, component_, starts_, offsets_, slots_, links_, active_;
-  Array<float> start_, w_, p_, y_, r_, z_, delta_, dots_, inverse_, rz_, next_, pq_, least_;
+  Array<int32_t> corners_, shape_, component_, starts_, chunk_starts_, offsets_, slots_, links_, active_;
+  Array<float> start_, w_, p_, y_, r_, z_, delta_, dots_, inverse_, chunks_, rz_, next_, pq_, least_;
   Array<float> rotation_, twist_, force_, product_, blocks_;
 };
 

@@ -879,6 +879,34 @@ TEST(FemCpu, LargeAndSmallSystemsAreSolvedAlike) {
     ASSERT_LT((one.position[i] - other.position[i]).norm(), 1e-9 * 0.01);
 }
 
+TEST_P(FemInSinglePrecision, LargeComponentsAreSummedByPieces) {
+  // 1,331 nodes lie in three chunks of a sum; beside them two small components.
+  Scene scene = cube(10, 0.01);
+  Scene more = block({2, 1, 1}, Vec3(0.01, 0.01, 0.01));
+  const auto first = static_cast<int32_t>(scene.rest.size());
+  for (const double at : {-1.0, 1.0}) {
+    const auto shift = static_cast<int32_t>(scene.rest.size());
+    for (const auto& cell : more.hexahedra) {
+      auto& next = scene.hexahedra.emplace_back(cell);
+      for (int32_t& i : next) i += shift;
+    }
+    for (const Vec3& x : more.rest) scene.rest.emplace_back(x + Vec3(at, 0, 0));
+  }
+  Draw draw(17);
+  scene.velocity.clear();
+  for (std::size_t i = 0; i < scene.rest.size(); ++i) scene.velocity.push_back(draw.vector(0.1));
+  scene.mass.assign(scene.rest.size(), 0.001), scene.held.assign(scene.rest.size(), 0);
+  const std::string parameters = "youngs_modulus=20000,steps=1,poisson_ratio=0.3";
+  const auto one = make_fem_cpu(scene, given(parameters + ",solver=1,tolerance=1e-12")),
+             other = make(scene, parameters);
+  one->advance(0.01);
+  other->advance(0.01);
+  const Frame a = one->frame(true), b = other->frame(true);
+  ASSERT_GT(a.position.size(), static_cast<std::size_t>(first));
+  for (std::size_t i = 0; i < a.position.size(); ++i)
+    ASSERT_LT((a.position[i] - b.position[i]).norm(), 1e-5 * 0.01 + 4 * u()) << i;
+}
+
 TEST(FemCpu, FirstFrequencyIsThatOfABeam) {
   // 8 × 1 × 1 thicknesses, four cells across. Against Euler and Bernoulli's beam: shear of trilinear cells (h / t)² / 4
   // = 1.6 % too high; shear and rotary inertia of a thick beam about (1.875 r / L)² (1 + E / κ G) / 2 = 0.8 % too low;
@@ -914,16 +942,28 @@ TEST(FemCpu, FirstFrequencyIsThatOfABeam) {
 
 // --- Judged ----------------------------------------------------------------------------------------------------------
 
-TEST(FemPlugin, JudgeFindsNothingInDrawnScenes) {
+// What `cutproof judge` prints of a plugin, and its exit status. CUTPROOF: another program than that of this build.
+std::pair<int, std::string> judged(const char* plugin, const std::string& options) {
   const char* const program = std::getenv("CUTPROOF");
+  const std::string command = "'" + std::string(program != nullptr ? program : CUTPROOF_PROGRAM) + "' judge '" +
+                              plugin + "' dissect --shrink 0 --save /tmp " + options + " 2>&1";
+  FILE* const pipe = popen(command.c_str(), "r");
+  std::string output;
+  for (int c = fgetc(pipe); c != EOF; c = fgetc(pipe)) output.push_back(static_cast<char>(c));
+  const int status = pclose(pipe);
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, output};
+}
+TEST(FemPlugin, JudgeFindsNothingInDrawnScenes) {
   for (const char* const plugin : {PLUGIN_CPU, PLUGIN_HOST}) {
-    const std::string command = "'" + std::string(program != nullptr ? program : CUTPROOF_PROGRAM) + "' judge '" +
-                                plugin + "' dissect --cases 20 --seed 1 --shrink 0 --save /tmp 2>&1";
-    FILE* const pipe = popen(command.c_str(), "r");
-    std::string output;
-    for (int c = fgetc(pipe); c != EOF; c = fgetc(pipe)) output.push_back(static_cast<char>(c));
-    const int status = pclose(pipe);
-    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << command << "\n" << output;
+    const auto [status, output] = judged(plugin, "--cases 20 --seed 1");
+    EXPECT_EQ(status, 0) << output;
+  }
+}
+TEST(FemPlugin, SaysWhatIsWrongWithParameters) {
+  for (const char* const plugin : {PLUGIN_CPU, PLUGIN_HOST}) {
+    const auto [status, output] = judged(plugin, "--cases 10 --parameters steps=0");
+    EXPECT_EQ(status, 77) << output;  // it cannot run
+    EXPECT_NE(output.find("parameter 'steps' is 0; give a number from 1 to 1e+06"), std::string::npos) << output;
   }
 }
 
