@@ -16,7 +16,8 @@ struct Settings {
   double youngs_modulus = 0;   // Pa
   double poisson_ratio = 0;    // above -1, below 0.5
   double density = 0;          // kg/m³; 0: masses of the scene
-  double damping = 0;          // s: D = damping · K̂ (Rayleigh)
+  double damping = 0;          // 1/s: velocities decay by this rate
+  double rayleigh = 0;         // s: D = rayleigh · K̂
   int steps = 4;               // of implicit Euler in a frame
   int newton = 1;              // Newton steps in each; 1: semi-implicit, as published
   int solver = 0;              // of the CPU program: 0 CHOLMOD, 1 conjugate gradients

@@ -20,6 +20,7 @@ std::map<std::string, double> known_parameters() {
           {"poisson_ratio", s.poisson_ratio},
           {"density", s.density},
           {"damping", s.damping},
+          {"rayleigh", s.rayleigh},
           {"steps", s.steps},
           {"newton", s.newton},
           {"solver", s.solver},
@@ -52,6 +53,7 @@ Settings settings_of(const Parameters& parameters, double spacing) {
   s.poisson_ratio = within("poisson_ratio", -0.99, 0.4999);
   s.density = within("density", 0, 1e9);
   s.damping = within("damping", 0, 1e6);
+  s.rayleigh = within("rayleigh", 0, 1e6);
   s.steps = whole("steps", 1, 1'000'000);
   s.newton = whole("newton", 1, 1000);
   s.solver = whole("solver", 0, 1);
@@ -331,6 +333,7 @@ class Cpu : public Simulator {
   }
 
   int substeps() const override { return settings_.steps; }
+  double damping() const override { return settings_.damping; }
   void kick(const std::vector<Vec3>& kick) override {
     // Nodes that were split off may belong to another piece, and get nothing.
     const std::vector<Vec3> by = interpolated(mesh_, kick);
@@ -347,7 +350,7 @@ class Cpu : public Simulator {
       for (Component& component : components_) move(component, dt);
       for (std::size_t i = 0; i < x_.size(); ++i) {
         if (mesh_.held[i] != 0) continue;
-        if (mesh_.own_mass[i] > 0) v_[i] += dt * gravity_;
+        if (mesh_.own_mass[i] > 0) v_[i] = std::exp(-settings_.damping * dt) * v_[i] + dt * gravity_;
         if (mass_[i] > 0) x_[i] += dt * v_[i];
         if (!x_[i].allFinite() || !v_[i].allFinite())
           throw std::runtime_error("the motion is not finite any more; take more steps, or a lower modulus");
@@ -359,6 +362,7 @@ class Cpu : public Simulator {
     const auto is_crossed = [&](const Vec3& a, const Vec3& b) {
       return std::any_of(patches.begin(), patches.end(), [&](const Patch& patch) { return crosses(patch, a, b); });
     };
+    bool is_new = false;
     std::vector<Vec3> centre;
     for (std::size_t c = 0; c < mesh_.cells.size(); ++c) {
       const Corners corners = corners_of(x_, mesh_.cells[c]);
@@ -371,14 +375,15 @@ class Cpu : public Simulator {
           a += corners.row(ends.first[k]).transpose() / ends.count;
           b += corners.row(ends.second[k]).transpose() / ends.count;
         }
-        if (is_crossed(a, b)) mesh_.is_removed[c] = 1;
+        if (is_crossed(a, b)) is_new |= remove_cell(mesh_, c);
       }
     }
     for (std::size_t l = 0; l < mesh_.links.size() && !settings_.removes_cells; ++l) {
       const auto [a, b] = mesh_.links[l];
-      if (is_crossed(centre[static_cast<std::size_t>(a)], centre[static_cast<std::size_t>(b)])) mesh_.is_cut[l] = 1;
+      if (is_crossed(centre[static_cast<std::size_t>(a)], centre[static_cast<std::size_t>(b)]))
+        is_new |= cut_link(mesh_, l);
     }
-    split_nodes();
+    if (is_new) split_nodes();
   }
 
   Frame frame(bool changed) const override {
@@ -408,10 +413,11 @@ class Cpu : public Simulator {
     for (std::vector<Vec3>* const each : {&delta_, &right_, &start_, &w}) each->resize(x_.size());
     for (const int32_t node : component.nodes) {
       const auto i = static_cast<std::size_t>(node);
+      v_[i] *= std::exp(-settings_.damping * dt);
       start_[i] = v_[i];
       w[i].setZero();
     }
-    const double b = settings_.damping;
+    const double b = settings_.rayleigh;
     stiffness_.resize(component.cells.size());
     for (int k = 0; k < settings_.newton; ++k) {
       for (const int32_t node : component.nodes) {

@@ -359,6 +359,7 @@ class Kernels : public Simulator {
   }
 
   int substeps() const override { return settings_.steps; }
+  double damping() const override { return settings_.damping; }
 
   void kick(const std::vector<Vec3>& kick) override {
     const std::vector<Vec3> by = interpolated(mesh_, kick);
@@ -387,6 +388,7 @@ class Kernels : public Simulator {
     const float* const patch = blade.data();
     const auto count = static_cast<int64_t>(patches.size());
     const View s = view();
+    bool is_new = false;
     if (settings_.removes_cells) {
       Array<uint8_t> met(mesh_.cells.size());
       uint8_t* const is_met = met.data();
@@ -409,7 +411,7 @@ class Kernels : public Simulator {
         }
       });
       const std::vector<uint8_t> found = met.copy();
-      for (std::size_t c = 0; c < found.size(); ++c) mesh_.is_removed[c] |= found[c];
+      for (std::size_t c = 0; c < found.size(); ++c) is_new |= found[c] != 0 && remove_cell(mesh_, c);
     } else {
       Array<uint8_t> crossed(mesh_.links.size());
       uint8_t* const is_crossed = crossed.data();
@@ -421,9 +423,9 @@ class Kernels : public Simulator {
         if (crosses_any(patch, count, a, b)) is_crossed[l] = 1;
       });
       const std::vector<uint8_t> found = crossed.copy();
-      for (std::size_t l = 0; l < found.size(); ++l) mesh_.is_cut[l] |= found[l];
+      for (std::size_t l = 0; l < found.size(); ++l) is_new |= found[l] != 0 && cut_link(mesh_, l);
     }
-    split_nodes();
+    if (is_new) split_nodes();
   }
 
   void finish() override { executor_.finish(); }
@@ -446,13 +448,18 @@ class Kernels : public Simulator {
     const std::size_t nodes = place_.size(), cells = mesh_.cells.size();
     if (nodes == 0) return;
     const View s = view();
-    const auto b = static_cast<float>(settings_.damping);
+    const auto b = static_cast<float>(settings_.rayleigh);
+    const auto decay = static_cast<float>(std::exp(-settings_.damping * dt));
     const float scale = dt * (dt + b);
     float *const x = x_.data(), *const v = v_.data(), *const start = start_.data(), *const w = w_.data();
     float *const way = p_.data(), *const y = y_.data(), *const r = r_.data(), *const z = z_.data();
     float *const delta = delta_.data(), *const dots = dots_.data(), *const inverse = inverse_.data();
     const float gx = gravity_[0], gy = gravity_[1], gz = gravity_[2];
-    executor_.for_each(3 * nodes, [=] BASELINES_KERNEL(int64_t k) { start[k] = v[k], w[k] = 0; });
+    executor_.for_each(3 * nodes, [=] BASELINES_KERNEL(int64_t k) {
+      v[k] *= decay;
+      start[k] = v[k];
+      w[k] = 0;
+    });
     for (int newton = 0; newton < settings_.newton; ++newton) {
       executor_.for_each(3 * nodes, [=] BASELINES_KERNEL(int64_t k) {
         way[k] = dt * (b * v[k] + dt * (v[k] - w[k]));
@@ -626,15 +633,17 @@ class Kernels : public Simulator {
     for (const auto& cell : mesh_.cells) {
       for (const int32_t i : cell) corners.push_back(static_cast<int32_t>(place_[static_cast<std::size_t>(i)]));
     }
-    std::vector<std::vector<int32_t>> around(nodes);
-    for (std::size_t c = 0; c < cells; ++c) {
-      for (std::size_t a = 0; a < 8 && mesh_.is_removed[c] == 0; ++a)
-        around[static_cast<std::size_t>(corners[8 * c + a])].push_back(static_cast<int32_t>(a * cells + c));
-    }
-    for (std::size_t i = 0; i < nodes; ++i) {
-      slots.insert(slots.end(), around[i].begin(), around[i].end());
-      offsets[i + 1] = static_cast<int32_t>(slots.size());
-    }
+    const auto each_corner = [&](const auto& see) {
+      for (std::size_t k = 0; k < corners.size(); ++k) {
+        if (mesh_.is_removed[k / 8] == 0)
+          see(static_cast<std::size_t>(corners[k]), static_cast<int32_t>(k % 8 * cells + k / 8));
+      }
+    };
+    each_corner([&](std::size_t i, int32_t) { ++offsets[i + 1]; });
+    std::partial_sum(offsets.begin(), offsets.end(), offsets.begin());
+    slots.resize(static_cast<std::size_t>(offsets.back()));
+    std::vector<int32_t> next = offsets;
+    each_corner([&](std::size_t i, int32_t slot) { slots[static_cast<std::size_t>(next[i]++)] = slot; });
     std::vector<int32_t> links;
     for (const auto& link : mesh_.links) links.insert(links.end(), link.begin(), link.end());
     x_ = Array<float>(places), v_ = Array<float>(velocities), mass_ = Array<float>(mass);

@@ -32,6 +32,7 @@ struct Mesh {
   std::vector<uint8_t> is_removed;                              // [c]
   std::vector<std::array<int32_t, 2>> links;                    // [l] cells that share a face, the lower one first
   std::vector<uint8_t> is_cut;                                  // [l]
+  std::vector<uint8_t> is_touched;                              // [c] 1: split() has to look at its nodes
   std::vector<Vec3> rest;                                       // [p] m; the first n nodes are the scene's particles
   std::vector<double> own_mass;                                 // [p] kg of particles in no cell; otherwise 0
   std::vector<uint8_t> held;                                    // [p]
@@ -129,6 +130,7 @@ inline Mesh mesh_of(const Scene& scene, int refine, double density) {
   }
   for (double& mass : mesh.cell_mass) mass *= density > 0 ? density : of_cells / volume;
   mesh.is_removed.assign(mesh.cells.size(), 0);
+  mesh.is_touched.assign(mesh.cells.size(), 1);
   mesh.parent.assign(mesh.rest.size(), -1);
   std::map<std::array<int32_t, 4>, int32_t> cell_at;
   for (int32_t c = 0; c < static_cast<int32_t>(mesh.cells.size()); ++c) {
@@ -178,6 +180,20 @@ inline Around around_nodes(const Mesh& mesh) {
   return around;
 }
 
+// Return whether that is new.
+inline bool cut_link(Mesh& mesh, std::size_t link) {
+  const bool is_new = mesh.is_cut[link] == 0;
+  mesh.is_cut[link] = 1;
+  for (const int32_t c : mesh.links[link]) mesh.is_touched[static_cast<std::size_t>(c)] = 1;
+  return is_new;
+}
+inline bool remove_cell(Mesh& mesh, std::size_t cell) {
+  const bool is_new = mesh.is_removed[cell] == 0;
+  mesh.is_removed[cell] = 1;
+  if (is_new) mesh.is_touched[cell] = 1;
+  return is_new;
+}
+
 // Gives each group of a node's cells, as uncut links around that node join them, a node of its own. The group with the
 // lowest cell keeps the node. Returns the parent of each new node; they are appended in that order.
 inline std::vector<int32_t> split(Mesh& mesh) {
@@ -191,7 +207,13 @@ inline std::vector<int32_t> split(Mesh& mesh) {
   }
   std::vector<int32_t> parents;
   const std::size_t count = mesh.rest.size();
+  std::vector<uint8_t> is_due(count, 0);
+  for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
+    for (const int32_t i : mesh.cells[c]) is_due[static_cast<std::size_t>(i)] |= mesh.is_touched[c];
+    mesh.is_touched[c] = 0;
+  }
   for (std::size_t i = 0; i < count; ++i) {
+    if (is_due[i] == 0) continue;
     const auto begin = around.cells.begin() + static_cast<std::ptrdiff_t>(around.offsets[i]),
                end = around.cells.begin() + static_cast<std::ptrdiff_t>(around.offsets[i + 1]);
     std::vector<std::array<int32_t, 2>> joined;
