@@ -221,14 +221,7 @@ class Component {
           std::lower_bound(first + matrix_.outerIndexPtr()[column], first + matrix_.outerIndexPtr()[column + 1], row) -
           first));
     });
-    // Supernodal factors are faster for large systems; their sums are those of a library for dense matrices.
-    constexpr int kLarge = 3000;
-    if (unknowns_ > 0) {
-      factor_ = std::make_unique<Factor>();
-      factor_->cholmod().print = 0;  // what fails is thrown
-      factor_->setMode(unknowns_ < kLarge ? Eigen::CholmodSimplicialLLt : Eigen::CholmodSupernodalLLt);
-      factor_->analyzePattern(matrix_);
-    }
+    factor_.reset();
   }
 
   // Solves (diagonal + scale · K) Δ = b. `diagonal` and `b` are [p], of which those of this component are used;
@@ -258,7 +251,17 @@ class Component {
       gradients.setMaxIterations(settings.iterations);
       solution = gradients.compute(matrix_).solve(right);
     } else {
-      factor_->factorize(matrix_);
+      if (factor_ == nullptr) {
+        // Supernodal factors are faster for large systems; their sums are those of a library for dense matrices.
+        constexpr int kLarge = 3000;
+        factor_ = std::make_unique<Factor>();
+        factor_->cholmod().print = 0;  // what fails is thrown
+        factor_->setMode(unknowns_ < kLarge ? Eigen::CholmodSimplicialLLt : Eigen::CholmodSupernodalLLt);
+        factor_->analyzePattern(matrix_);
+      }
+      if (factor_->info() == Eigen::Success) factor_->factorize(matrix_);
+      if (factor_->cholmod().status == CHOLMOD_OUT_OF_MEMORY || factor_->cholmod().status == CHOLMOD_TOO_LARGE)
+        throw std::runtime_error("memory does not suffice to factor the system of equations; take solver=1");
       if (factor_->info() != Eigen::Success)
         throw std::runtime_error("the system of equations cannot be factored; take more steps, or a lower modulus");
       solution = factor_->solve(right);
