@@ -259,9 +259,11 @@ class Component {
         factor_->setMode(unknowns_ < kLarge ? Eigen::CholmodSimplicialLLt : Eigen::CholmodSupernodalLLt);
         factor_->analyzePattern(matrix_);
       }
-      if (factor_->info() == Eigen::Success) factor_->factorize(matrix_);
-      if (factor_->cholmod().status == CHOLMOD_OUT_OF_MEMORY || factor_->cholmod().status == CHOLMOD_TOO_LARGE)
-        throw std::runtime_error("memory does not suffice to factor the system of equations; take solver=1");
+      const auto fits = [&] {
+        return factor_->cholmod().status != CHOLMOD_OUT_OF_MEMORY && factor_->cholmod().status != CHOLMOD_TOO_LARGE;
+      };
+      if (fits()) factor_->factorize(matrix_);
+      if (!fits()) throw std::runtime_error("memory does not suffice to factor the system of equations; take solver=1");
       if (factor_->info() != Eigen::Success)
         throw std::runtime_error("the system of equations cannot be factored; take more steps, or a lower modulus");
       solution = factor_->solve(right);
