@@ -70,7 +70,8 @@ class Simulator {
   virtual ~Simulator() = default;
   virtual int substeps() const = 0;             // in a frame
   virtual double damping() const { return 0; }  // 1/s: velocities decay by this rate
-  // Adds to the velocities: `kick` is [n] of the scene's particles; what was split from one gets its kick.
+  // Adds to the velocities: `kick` is [n] of the scene's particles. Nodes split from one may be of another piece, and
+  // get none.
   virtual void kick(const std::vector<Vec3>& kick) = 0;
   // One frame of motion.
   virtual void advance(double frame_time) = 0;
