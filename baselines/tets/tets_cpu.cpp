@@ -218,9 +218,10 @@ std::vector<Crossing> crossings(const Mesh& mesh, std::span<const Vec3> x, const
     for (const Edge& edge : mesh.edges()) {
       const auto [a, b] = edge;
       if (is_above(a) == is_above(b)) continue;
-      // Where both ends lie on one side of the plane one of them is near; where both are near rounding decides nothing.
+      // Where both ends lie on one side of the plane one of them is near. Where two new ones are near rounding decides
+      // nothing.
       const double from = height(a), to = height(b), nearest = std::abs(from) < std::abs(to) ? 0 : 1;
-      const bool is_thin = std::max(std::abs(from), std::abs(to)) < thin;
+      const bool is_thin = std::min(a, b) >= mesh.particles() && std::max(std::abs(from), std::abs(to)) < thin;
       const double share = is_thin ? 0.5 : (from >= 0) != (to >= 0) ? from / (from - to) : nearest;
       const Vec3 there = (1 - share) * x[at(a)] + share * x[at(b)];
       const auto inside = [&](const Vec3& q, const Vec3& r) { return (r - q).cross(there - q).dot(normal); };

@@ -349,7 +349,8 @@ class Kernels : public Simulator {
           return;
         const Double3 a = wide(x[ends[0]]), b = wide(x[ends[1]]);
         const double from = height_of(p, a), to = height_of(p, b), s = from < 0 ? -from : from, t = to < 0 ? -to : to;
-        const double share = s < thin && t < thin ? 0.5 : (from >= 0) != (to >= 0) ? s / (s + t) : s < t ? 0 : 1;
+        const bool is_thin = ends[0] >= particles && s < thin && t < thin;  // the first end is the smaller number
+        const double share = is_thin ? 0.5 : (from >= 0) != (to >= 0) ? s / (s + t) : s < t ? 0 : 1;
         const Double3 there = (1 - share) * a + share * b;
         // Signed volumes over the triangle's sides: tetrahedra with an apex above its plane.
         const double borders[3] = {dot(normal, cross(p1 - p0, there - p0)), dot(normal, cross(p2 - p1, there - p1)),
