@@ -83,6 +83,10 @@ class Simulator {
   virtual Frame frame(bool changed) const = 0;
 };
 
+#ifdef BASELINES_HAVE_CUDA
+void require_device();  // throws std::runtime_error where there is none
+#endif
+
 // Simulates the scene and answers. Returns 0, or 1 where memory does not suffice for the answer.
 int dissect(Simulator& simulator, const Scene& scene, const cutproof_host* host, cutproof_frames* run);
 

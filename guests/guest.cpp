@@ -236,6 +236,10 @@ void Guest::greet(double time_limit) {
   if (hello->greeting != wire::Greeting::ready) {
     stop();
     if (hello->greeting == wire::Greeting::cannot_run_here) throw CannotRunHere(text(hello->text));
+    if (hello->greeting == wire::Greeting::wrong_parameters) {
+      throw InputError(options_.library, "parameters", text(hello->text),
+                       fmt::format("they are \"{}\"", options_.parameters));
+    }
     throw InputError(options_.library, "", text(hello->text), remedy);
   }
   plugin_.name = text(hello->name);

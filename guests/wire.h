@@ -75,7 +75,8 @@ enum class Greeting : int32_t {
   cannot_load,     // text: why
   no_entry,        // the library exports no plugin
   wrong_abi,       // text: which
-  cannot_run_here  // create() gave nothing, or there is no device; text: why
+  cannot_run_here,  // create() gave nothing, or there is no device; text: why
+  wrong_parameters  // text: which
 };
 
 // The guest's first message.

@@ -1,5 +1,3 @@
-// nvcc says of Eigen's defaulted functions that their annotations are ignored.
-#pragma nv_diag_suppress 20012
 #include "baselines/fem/fem_kernels.h"
 
 namespace cutproof::baselines {

@@ -28,10 +28,6 @@ std::unique_ptr<Simulator> make_mpm_cuda(const Scene& scene, const Parameters& p
 
 namespace mpm {
 
-#ifdef BASELINES_HAVE_CUDA
-void require_device();  // throws std::runtime_error where there is none
-#endif
-
 using Mat3 = Eigen::Matrix3d;
 
 // Names and defaults:

@@ -6,8 +6,4 @@ std::unique_ptr<Simulator> make_mpm_cuda(const Scene& scene, const Parameters& p
   return std::make_unique<mpm_kernels::Program<Device>>(scene, parameters);
 }
 
-namespace mpm {
-void require_device() { const Device device; }
-}  // namespace mpm
-
 }  // namespace cutproof::baselines

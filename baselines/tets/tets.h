@@ -28,7 +28,6 @@ Parameters tets_parameters(const char* text);
 std::unique_ptr<Simulator> make_tets_cpu(const Scene& scene, const Parameters& parameters);
 std::unique_ptr<Simulator> make_tets_host(const Scene& scene, const Parameters& parameters);
 #ifdef BASELINES_HAVE_CUDA
-bool has_tets_device();
 std::unique_ptr<Simulator> make_tets_cuda(const Scene& scene, const Parameters& parameters);
 #endif
 

@@ -3,11 +3,6 @@
 
 namespace cutproof::baselines {
 
-bool has_tets_device() {
-  int count = 0;
-  return cudaGetDeviceCount(&count) == cudaSuccess && count > 0;
-}
-
 std::unique_ptr<Simulator> make_tets_cuda(const Scene& scene, const Parameters& parameters) {
   return std::make_unique<tets::Kernels<Device>>(scene, parameters);
 }

@@ -229,7 +229,11 @@ const cutproof_array* setup_of(const cutproof_host*, const char* name) {
   return held == nullptr ? nullptr : &held->shown;
 }
 
-cutproof_host host = {sizeof(cutproof_host), CUTPROOF_ABI, nullptr, nullptr, grow, write_log, setup_of};
+std::string wrong_parameters;
+void refuse_parameters(const cutproof_host*, const char* text) { wrong_parameters = text; }
+
+cutproof_host host = {sizeof(cutproof_host), CUTPROOF_ABI, nullptr, nullptr, grow, write_log, setup_of,
+                      refuse_parameters};
 
 // --- Operations ------------------------------------------------------------------------------------------------------
 
@@ -531,8 +535,9 @@ void greet(wire::Hello& hello, const char* library) {
   }
   void* self = nullptr;
   if (!instance(0, self)) {
-    hello.greeting = wire::Greeting::cannot_run_here;
-    put(hello.text, "its create() returned nothing: it cannot run here");
+    const bool is_refused = !wrong_parameters.empty();
+    hello.greeting = is_refused ? wire::Greeting::wrong_parameters : wire::Greeting::cannot_run_here;
+    put(hello.text, is_refused ? wrong_parameters : "its create() returned nothing: it cannot run here");
   }
 }
 

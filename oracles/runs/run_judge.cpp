@@ -763,13 +763,14 @@ class RunJudge::Implementation {
   }
 
   // Two particles of one group that lie in different pieces; -1 if there are none, as of cells.
+  // Two units of tissue; particles that were added later are none.
   std::array<int32_t, 2> parted_in_a_group(const SweptTissue::Pieces& apart) const {
     for (std::size_t g = 0; !by_cells() && g + 1 < coupling_.offsets.size(); ++g) {
       int32_t first = -1;
       for (auto k = at(coupling_.offsets[g]); k < at(coupling_.offsets[g + 1]); ++k) {
         const int32_t i = coupling_.members[k];
         const bool is_joined = coupling_.weights.empty() || std::abs(coupling_.weights[k]) > header_.u;
-        if (!is_joined || apart.label[at(i)] < 0 || tissue_->is_beside(i)) continue;
+        if (i >= units_ || !is_joined || apart.label[at(i)] < 0 || tissue_->is_beside(i)) continue;
         if (first >= 0 && apart.label[at(first)] != apart.label[at(i)]) return {first, i};
         first = i;
       }

@@ -568,7 +568,12 @@ class TetsProgram : public testing::TestWithParam<Program> {
   void SetUp() override {
     if (GetParam().make == nullptr) GTEST_SKIP() << "this build has no CUDA";
 #ifdef BASELINES_HAVE_CUDA
-    if (std::string(GetParam().name) == "cuda" && !has_tets_device()) GTEST_SKIP() << "there is no CUDA device";
+    if (std::string(GetParam().name) != "cuda") return;
+    try {
+      require_device();
+    } catch (const std::runtime_error& error) {
+      GTEST_SKIP() << error.what();
+    }
 #endif
   }
   static std::unique_ptr<Simulator> make(const Scene& scene, const char* parameters = "") {

@@ -104,6 +104,17 @@ TEST(Dissect, AFailureIsShrunkSavedAndFailsAgain) {
   }
 }
 
+// Not that it cannot run here, which would be skipped.
+TEST(Dissect, ParametersThatThePluginRefusesAreAnError) {
+  try {
+    const Guest guest({PLUGIN_springs, "stiff", 20});
+    ADD_FAILURE() << "it has taken them";
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.field(), "parameters");
+    EXPECT_EQ(error.problem(), "there is no parameter 'stiff'");
+  }
+}
+
 TEST(Dissect, ASimplerSceneLeavesOutAStrokeAndKeepsTheOther) {
   const Question two = dissect().draw_for(3, 5, with_limits(""));
   ASSERT_EQ(given(two, "blades").integer(0), 2);

@@ -9,7 +9,10 @@ static char mode[64] = "right";
 static int is(const char* what) { return strcmp(mode, what) == 0; }
 
 static void* create(const cutproof_host* host, const char* parameters) {
-  (void)host;
+  if (parameters != NULL && strcmp(parameters, "stiff") == 0) {
+    host->refuse_parameters(host, "there is no parameter 'stiff'");
+    return NULL;
+  }
   if (parameters != NULL && parameters[0] != 0) strncpy(mode, parameters, sizeof mode - 1);
   return mode;
 }

@@ -460,6 +460,24 @@ TEST(RunJudge, NamesTwoParticlesOfTheGroupThatJoinsWhatTheBladeHasParted) {
   EXPECT_EQ(across->witness.frames, (std::vector<int64_t>{5, 9}));
 }
 
+// A vertex that is split off later is no tissue of its own.
+TEST(RunJudge, NamesTissueOfAGroupWithLaterVertices) {
+  Bar bar;
+  for (std::size_t f = 5; f < Bar::kFrames; ++f) {
+    bar.x[f].push_back(bar.x[f][2]);
+    bar.v[f].push_back(bar.v[f][2]);
+    bar.alive[f].push_back(1);
+    bar.piece[f].push_back(0);
+    bar.coupling[f].members.insert(bar.coupling[f].members.end(), {24, 7, 22});
+    bar.coupling[f].offsets.push_back(std::ssize(bar.coupling[f].members));
+  }
+  for (const Verdict& verdict : bar.verdicts()) {
+    if (verdict.property != "no coupling across pieces") continue;
+    EXPECT_FALSE(verdict.holds);
+    EXPECT_EQ(verdict.witness.particles, (std::vector<int32_t>{7, 22})) << verdict.witness.text;
+  }
+}
+
 // One particle in the wrong body is not half of the tissue in it.
 TEST(RunJudge, CountsWhatIsInTheWrongBody) {
   Bar bar;

@@ -95,6 +95,8 @@ typedef struct cutproof_host {
   /* In load and run: a field of the setup by its name in docs/reference/recording.md, such as "step/iterations" or
    * "blade_moves/down", with the type it has there; in host memory. Null: there is none. */
   const cutproof_array* (*setup)(const struct cutproof_host* host, const char* name);
+  /* In create, before it returns null: its parameters are wrong. The text says which, and what to give. */
+  void (*refuse_parameters)(const struct cutproof_host* host, const char* text);
 } cutproof_host;
 
 typedef struct cutproof_plugin {
