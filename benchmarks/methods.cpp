@@ -35,12 +35,13 @@ constexpr int64_t kFeltFrames = 5;    // in which a kick is looked for
 constexpr int64_t kFragment = 8;      // a piece with fewer particles is none that anybody wanted
 constexpr double kTimeLimit = 1800;   // [s] of a plugin for one run
 
-// What the blade sweeps on the way to each frame of a run, from its edge to its back; NaN: nothing. Strokes go along
-// the blade's plane, so it is one quad.
-std::vector<Vec3> swept_by_blade(const Setup& setup) {
+// What the blade's edge sweeps on the way to each frame of a run, and on the way to the one before: tissue that moves
+// meanwhile is not left uncut between two patches. NaN: nothing.
+std::vector<Vec3> swept_by_edge(const Setup& setup) {
   const double nan = std::nan("");
   std::vector<Vec3> corners(4, Vec3{nan, nan, nan});
   const int64_t substeps = setup.step.substeps;
+  const BladePose* before = nullptr;  // where the edge was as the frame before began, in the same stroke
   for (int64_t frame = 0; frame < setup.frame_count(); ++frame) {
     const BladeMove *first = nullptr, *last = nullptr;
     for (int64_t s = frame * substeps; s < (frame + 1) * substeps; ++s) {
@@ -49,16 +50,17 @@ std::vector<Vec3> swept_by_blade(const Setup& setup) {
       if (first == nullptr) first = &move;
       last = &move;
     }
-    const auto end = [&](const BladePose& pose, double side, double depth) {
-      return pose.edge + (side * setup.blade.length / 2) * pose.along + depth * pose.back;
+    const auto end = [&](const BladePose& pose, double side) {
+      return pose.edge + (side * setup.blade.length / 2) * pose.along;
     };
     if (first == nullptr) {
       corners.insert(corners.end(), 4, Vec3{nan, nan, nan});
-    } else {
-      const double depth = setup.blade.depth;
-      corners.insert(corners.end(), {end(last->to, -1, 0), end(last->to, 1, 0), end(first->from, 1, depth),
-                                     end(first->from, -1, depth)});
+      before = nullptr;
+      continue;
     }
+    const BladePose& from = before != nullptr ? *before : first->from;
+    corners.insert(corners.end(), {end(from, -1), end(from, 1), end(last->to, 1), end(last->to, -1)});
+    before = &first->from;
   }
   return corners;
 }
@@ -399,7 +401,7 @@ Kidney make_kidney(int64_t particles, double youngs_modulus) {
   const double h = kidney.setup.body.grid.spacing, c = spec.clusters.side;
   kidney.setup.step.stiffness = 2 * youngs_modulus / (spec.body.density * c * h * h);
   kidney.scene = scene_of(kidney.setup, kidney.start);
-  kidney.scene.blade = swept_by_blade(kidney.setup);
+  kidney.scene.blade = swept_by_edge(kidney.setup);
   for (int64_t f = 0; f < kidney.scene.frames; ++f) {
     if (!is_swept(kidney.scene.blade, f)) continue;
     if (kidney.uncut == 0) kidney.uncut = f - 1;

@@ -120,18 +120,20 @@ class Kernels : public Simulator {
 
   void cut(const std::vector<Patch>& patches) override {
     std::vector<Vec3> x, v;
-    for (const Float3& each : x_.copy()) x.push_back(vector_of(each));
-    for (const Float3& each : v_.copy()) v.push_back(vector_of(each));
     for (const Patch& patch : patches) {
       const std::vector<Crossing> found = crossed(patch);
       if (found.empty()) continue;
+      if (x.empty()) {
+        for (const Float3& each : x_.copy()) x.push_back(vector_of(each));
+        for (const Float3& each : v_.copy()) v.push_back(vector_of(each));
+      }
       for (auto parts = mesh_.cut(found); !parts.empty(); parts = mesh_.cut({})) {
         x = after_cut(mesh_, parts, x);
         v = after_cut(mesh_, parts, v);
       }
       upload(x, x_);
     }
-    upload(x, x_);
+    if (x.empty()) return;
     upload(v, v_);
     build();
   }
