@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <set>
 #include <utility>
 
 #include "benchmarks/paper.h"
@@ -345,21 +346,23 @@ nlohmann::json error_of(const MethodRun& run, const Kidney& kidney, const Conver
           {"displacement", scale}};
 }
 
-// How far other pieces are off, as a share of how far the kicked one is; null where no piece can be kicked.
+// The largest piece that nothing holds is kicked. How far what is held is off, as a share of how far that piece is;
+// null where no piece is free. `piece`: of each particle of the scene.
 nlohmann::json felt(Method& method, const Kidney& kidney, const MethodRun& without, const std::vector<int32_t>& piece,
                     int64_t kick_frame) {
   std::map<int32_t, std::vector<int32_t>> free;
   for (int32_t i = 0; i < kidney.scene.count(); ++i) {
     if (piece[at(i)] >= 0) free[piece[at(i)]].push_back(i);
   }
-  std::erase_if(free, [&](const auto& one) {
-    return std::ssize(one.second) < kFragment ||
-           std::any_of(one.second.begin(), one.second.end(), [&](int32_t i) { return kidney.scene.held[at(i)] != 0; });
-  });
-  if (free.empty()) return nullptr;
-  const auto& [kicked_piece, particles] = *std::max_element(
-      free.begin(), free.end(), [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); });
-  const MethodKick kick = {kick_frame, particles, {kKick, 0, kKick}};
+  std::set<int32_t> held;
+  for (int32_t i = 0; i < kidney.scene.count(); ++i) {
+    if (kidney.scene.held[at(i)] != 0) held.insert(piece[at(i)]);
+  }
+  std::erase_if(free, [&](const auto& one) { return held.contains(one.first); });
+  const auto largest = std::max_element(free.begin(), free.end(),
+                                        [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); });
+  if (largest == free.end() || std::ssize(largest->second) < kFragment) return nullptr;
+  const MethodKick kick = {kick_frame, largest->second, {kKick, 0, kKick}};
   const int64_t frames = std::min(kick_frame + kFeltFrames, kidney.scene.frames);
   const MethodRun with = method.run(kidney, frames, &kick);
   if (!with.refused.empty()) return nullptr;
@@ -369,9 +372,9 @@ nlohmann::json felt(Method& method, const Kidney& kidney, const MethodRun& witho
                             b = scenes::vectors_of(*find_array(with.frames[at(f)].arrays, "positions"));
     for (std::size_t i = 0; i < piece.size(); ++i) {
       const double off = norm(b[i] - a[i]);
-      if (!std::isfinite(off) || piece[i] < 0) continue;
-      double& of = piece[i] == kicked_piece ? own : others;
-      of = std::max(of, off);
+      if (!std::isfinite(off)) continue;
+      if (piece[i] == largest->first) own = std::max(own, off);
+      if (held.contains(piece[i])) others = std::max(others, off);
     }
   }
   return own > 0 ? nlohmann::json(others / own) : nlohmann::json();
@@ -489,7 +492,7 @@ nlohmann::json row_of(Method& method, const Kidney& kidney, const ConvergedKidne
   std::vector<int32_t> piece;
   const harness::JudgedRun judged =
       harness::judge_run(io::RunSegments("the run", run.frames), [&](int64_t frame, const oracles::RunJudge& judge) {
-        if (frame + 1 == kidney.scene.frames) piece = judge.piece_of_particles();
+        if (frame + 1 == kidney.scene.frames) piece = judge.piece_of_particles(true);
       });
   piece.resize(at(kidney.scene.count()), -1);
   const oracles::RunPieces& pieces = judged.pieces;
@@ -499,7 +502,7 @@ nlohmann::json row_of(Method& method, const Kidney& kidney, const ConvergedKidne
   for (const Verdict& verdict : judged.verdicts) {
     if (!verdict.holds) row["fails"].push_back(verdict.property);
   }
-  if (with_kicks && pieces.pieces > 1) {
+  if (with_kicks) {
     row["felt"]["blade_in"] = felt(method, kidney, run, piece, kidney.last_cut);
     row["felt"]["withdrawn"] = felt(method, kidney, run, piece, kidney.last_cut + 2);
   }

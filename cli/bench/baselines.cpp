@@ -14,7 +14,7 @@ void print_baselines(const nlohmann::json& document) {
   if (document.contains("methods")) {
     say_as_it_is("\n" + table_of(document.at("methods"), columns_of(report::kMethodsOfBaselines)) + "\n");
     say("s/s: computing time of a simulated second. error: RMS distance from the converged solution before the cut, as "
-        "a share of its displacement. felt: share of one piece's kick that others feel.\n");
+        "a share of its displacement. felt: share of a kick of a free piece that what is held feels.\n");
   }
   if (!document.at("holds")) {
     insist("FAILS: this method left isolated clusters or unequal components\n");

@@ -247,9 +247,9 @@ class RunJudge::Implementation {
     made.last_cut = last_cut_;
     return made;
   }
-  std::vector<int32_t> piece_of_particles() const {
+  std::vector<int32_t> piece_of_particles(bool touched_is_cut) const {
     if (!tissue_ || !holds(kForm) || !holds(kFinite)) return {};
-    const SweptTissue::Pieces apart = tissue_->apart();
+    const SweptTissue::Pieces apart = touched_is_cut ? tissue_->together() : tissue_->apart();
     std::vector<int32_t> piece(at(n_), -1), lowest(at(apart.count), std::numeric_limits<int32_t>::max());
     const auto each_particle = [&](const auto& visit) {
       for (int32_t unit = 0; unit < units_; ++unit) {
@@ -903,7 +903,9 @@ void RunJudge::finish() { self_->finish(); }
 std::vector<Verdict> RunJudge::verdicts() const { return self_->verdicts(); }
 std::vector<RunJudge::NotAsked> RunJudge::not_asked() const { return self_->not_asked(); }
 std::vector<std::string> RunJudge::notes() const { return self_->notes(); }
-std::vector<int32_t> RunJudge::piece_of_particles() const { return self_->piece_of_particles(); }
+std::vector<int32_t> RunJudge::piece_of_particles(bool touched_is_cut) const {
+  return self_->piece_of_particles(touched_is_cut);
+}
 RunPieces RunJudge::pieces() const { return self_->pieces(); }
 
 }  // namespace cutproof::oracles

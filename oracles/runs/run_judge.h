@@ -34,7 +34,8 @@ class RunJudge {
 
   // Of each particle the piece that it surely is in by now, told by the lowest particle in it; -1 of what is gone or no
   // tissue. Empty where the run has no tissue.
-  std::vector<int32_t> piece_of_particles() const;
+  // `touched_is_cut`: the same of the most pieces that there may be.
+  std::vector<int32_t> piece_of_particles(bool touched_is_cut = false) const;
 
   // After finish(): one of each property that was asked, its first failure or what came nearest to its bound; and why
   // the others were not.

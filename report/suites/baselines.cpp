@@ -58,7 +58,7 @@ void add_methods(Sheet& sheet, const Field& document) {
   const RowColumns columns = columns_of_methods();
   Grid grid = grid_of("Table 3: other simulators",
                       "All cut the same kidney of one material and are judged as runs. “coupled” are components of the "
-                      "coupling; “felt” is the share of one piece's kick that other pieces feel.",
+                      "coupling; “felt” is the share of a kick of the largest free piece that what is held feels.",
                       columns);
   document["methods"].each([&](const Field& row) {
     const bool is_refused = !row["refused"].is_nothing();

@@ -174,7 +174,7 @@ TEST(PluginMethods, AreAskedLikeAnyOther) {
   const json row = row_of(*method, kidney(), nullptr, true);
   EXPECT_TRUE(row.at("refused").is_null()) << row.at("refused");
   EXPECT_TRUE(row.at("timed_by_judge"));
-  // Springs along edges bear no shear: the kidney hangs below the blade, and no piece is there to be kicked.
+  // Springs along edges bear no shear: the kidney hangs below the blade, and nothing is cut off.
   EXPECT_EQ(row.at("fails"), json::array({"something was cut"}));
   EXPECT_TRUE(row.at("felt").at("withdrawn").is_null());
   EXPECT_NEAR(row.at("spin_kept").get<double>(), 1, 1e-12);
