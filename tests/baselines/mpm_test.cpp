@@ -97,6 +97,7 @@ struct Named {
   const char* name;
   Factory make;
 };
+void PrintTo(const Named& program, std::ostream* out) { *out << program.name; }
 std::string why_not(const Named& program) {
 #ifdef BASELINES_HAVE_CUDA
   if (std::string(program.name) != "cuda") return "";

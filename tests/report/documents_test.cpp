@@ -69,7 +69,7 @@ TEST(ACampaign, WithoutViolationSaysSoPlainly) {
   const Grid& properties = grid_of(sheet, 0);
   EXPECT_EQ(properties.rows.at(0).cells.at(7), "2 of 27") << "what is inconclusive within rounding is said";
   EXPECT_EQ(properties.rows.at(1).cells.at(2), "nothing to look at");
-  EXPECT_NE(sheet.notes.at(0).find("2 of the things"), std::string::npos);
+  EXPECT_NE(sheet.notes.at(0).find("2 comparisons"), std::string::npos);
 }
 
 // What was not met comes first; what needs bodies that move is not asked of others.
