@@ -42,7 +42,8 @@ with Browser(path) as page:
     assert f"'{first['property']}' fails" in summary and f"in frame {first['frame']}." in summary, summary
     assert document["pieces"]["in_words"] in summary and "after" not in summary, summary
     assert status.startswith(f"Frame {first['frame']} ") and "coupling group" in status, status
-    assert first["witness"]["text"] in page.text("#witness"), page.text("#witness")
+    assert page.text("#witness") == f"{first['property']} fails here.", page.text("#witness")
+    assert first["witness"]["text"] in page.text("#findings"), page.text("#findings")
     marks = page.data("findings[0].marks")
     assert marks["particles"] == first["witness"]["particles"] and marks["exact"], marks
     assert page.pixels()["orange"] > 0, "the witness is not seen"
@@ -80,6 +81,9 @@ with Browser(path) as page:
     # It plays to its end.
     page.driver.find_element(By.ID, "play").click()
     page.until("return document.documentElement.dataset.moment == arguments[0]", document["run"]["frames"] - 1)
+    # It fails to the end, and each of these frames says so.
+    assert first["witness"]["frames"][-1] == document["run"]["frames"] - 1, first["witness"]["frames"]
+    assert first["property"] in page.text("#witness"), page.text("#witness")
 
 
 # A narrow page folds what a wide one folds.
@@ -129,7 +133,9 @@ with Browser(path) as page:
     page.shown(first["marks"]["moment"], 0)
     card = page.text("#findings article")
     assert "times the bound of" in card and "It concerns the whole body." in card, card
+    # Beside a failure the blade's way is not drawn.
     seen = page.pixels()["sum"]
+    page.driver.find_element(By.ID, "way").click()
     page.scrub(0)
     page.scrub(first["marks"]["moment"])
     assert page.pixels()["sum"] == seen, "a verdict that names no place dims the view"
