@@ -72,9 +72,9 @@ struct Reply {
 
 enum class Greeting : int32_t {
   ready,
-  cannot_load,     // text: why
-  no_entry,        // the library exports no plugin
-  wrong_abi,       // text: which
+  cannot_load,      // text: why
+  no_entry,         // the library exports no plugin
+  wrong_abi,        // text: which
   cannot_run_here,  // create() gave nothing, or there is no device; text: why
   wrong_parameters  // text: which
 };
