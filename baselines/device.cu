@@ -1,8 +1,14 @@
+#include <cuda_runtime.h>
+
+#include <stdexcept>
+
 #include "baselines/dissection.h"
-#include "baselines/parallel.h"
 
 namespace cutproof::baselines {
 
-void require_device() { const Device device; }
+void require_device() {
+  const cudaError_t error = cudaFree(nullptr);
+  if (error != cudaSuccess) throw std::runtime_error(cudaGetErrorString(error));
+}
 
 }  // namespace cutproof::baselines

@@ -1,5 +1,6 @@
 #include "baselines/dissection.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <chrono>
 #include <cmath>

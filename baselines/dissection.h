@@ -1,7 +1,7 @@
 // What the simulators of this folder share: the scene that they are asked to dissect, and the way to the answer.
 // Lengths are in m, times in s, masses in kg.
 #pragma once
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <array>
 #include <cstdint>
 #include <map>

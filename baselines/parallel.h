@@ -17,7 +17,9 @@
 #include <vector>
 
 #ifdef __CUDACC__
-#include <cub/cub.cuh>
+#include <cub/device/device_radix_sort.cuh>
+#include <cub/device/device_scan.cuh>
+#include <cub/device/device_segmented_reduce.cuh>
 #define BASELINES_HOST_DEVICE __host__ __device__
 #else
 #define BASELINES_HOST_DEVICE

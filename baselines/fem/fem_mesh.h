@@ -1,5 +1,6 @@
 // Hexahedra of both programs, on the host: refinement, links between cells, and what a cut does to nodes.
 #pragma once
+#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cstdint>

@@ -7,6 +7,7 @@
 //
 // Lengths are in m, times in s, masses in kg.
 #pragma once
+#include <Eigen/Dense>
 #include <array>
 #include <cstdint>
 #include <map>

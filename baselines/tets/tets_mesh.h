@@ -8,6 +8,7 @@
 // A part gets vertices of its own on the edges that are cut: one for each edge and side, shared by all tetrahedra
 // there. So parts of two sides have no vertex in common, whatever the order of cuts.
 #pragma once
+#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cstdint>
