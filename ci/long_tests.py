@@ -34,7 +34,7 @@ LONG = (
     (r"ScenesOfTheProject\..*", "a scene of the project whose substeps do not suffice"),
     (r"AgainstTheReference\.TheReferenceDeviates.*", "a comparison that finds differences where there is none"),
     (r"(Vectors\.ThatThePageAnswersHold|Tutorial\.FromAFailingCutToTheFix)", "programs of a page that no longer run"),
-    (r"(BenchSensitivity|BenchSampling)\.HasARowForEach.*|BenchBaselines\.TellsOfEveryMethodWhatItCosts"
+    (r"(BenchSensitivity|BenchSampling)\.HasARowForEach.*|BenchBaselines\.(TellsOfEveryMethodWhatItCosts|AsksOtherSimulators)"
      r"|Bench\.ReproducesTable1.*", "a row of a suite that is missing or wrong"),
     (r"Skin\.LiesOnTheSurfaceOfAnUncutBody", "a skin that reference, kernels and oracles all have off the surface"),
     (r"Screen\.(IsNotLeftByAnyVerb|OnATerminal)", "a line that is too long in what a whole campaign or suite prints"),

@@ -77,6 +77,30 @@ TEST(Baselines, DifferInOneSettingFromThisMethod) {
 
 class BenchBaselines : public Program {};
 
+// Table 3: rows, runs that are kept, a document that follows its schema, and a page.
+TEST_F(BenchBaselines, AsksOtherSimulators) {
+  const std::string springs = CUTPROOF_PLUGIN_OF_SPRINGS;
+  const Outcome outcome = cutproof(
+      "bench baselines --backend host --particles 300 --sizes 600 --iterations 8 --no-kicks --save runs --with " +
+      springs + " --truth " + springs + " --truth-particles 700 --json out.json");
+  ASSERT_EQ(outcome.status, 0) << outcome.output;
+  expect_schema(path("out.json"));
+  const json document = json::parse(read("out.json"));
+  const json& methods = document.at("methods");
+  ASSERT_EQ(methods.size(), 6U);  // this method, four of its rules, the plugin
+  EXPECT_EQ(methods.back().at("name"), "springs");
+  EXPECT_EQ(document.at("truth").at("name"), "springs");
+  // It is compared with itself on another grid, and this method is not.
+  EXPECT_LT(methods.back().at("error").at("rms"), methods.front().at("error").at("rms"));
+  EXPECT_TRUE(methods.front().at("felt").at("withdrawn").is_null());
+  EXPECT_NE(outcome.output.find("springs"), std::string::npos) << outcome.output;
+  EXPECT_EQ(cutproof("check runs/5_springs_600").status, 1) << "the judge of saved runs says the same: it is not cut";
+  EXPECT_EQ(cutproof("report out.json -o page.html").status, 0);
+  EXPECT_NE(read("page.html").find("Table 3"), std::string::npos);
+  const Outcome none = cutproof("bench baselines --backend host --with nothing.so");
+  EXPECT_EQ(none.status, 2) << none.output;
+}
+
 TEST_F(BenchBaselines, TellsOfEveryMethodWhatItCosts) {
   for (const std::string backend : {"reference", "host"}) {
     const Outcome outcome = cutproof("bench baselines --particles 400 --seed 3 --json out.json --backend " + backend);
