@@ -110,7 +110,7 @@ def status(read):
     night = read("cpu_nightly")
     rows.append([f"every test, {night['cases']:,} cases a property", f"`{night['command']}`", "2 CPU cores",
                  f"{night['failed']} of {night['tests']:,} tests fail, {night['skipped']} skip by name; "
-                 f"{night['seconds'] / 60:.0f} min beside other work"])
+                 f"{night['seconds'] / 60:.0f} min beside other work, kernels for one kind of GPU"])
     lockstep = read("cpu_lockstep_host")["scenes"]
     differing = sum(one["topology_differences"] for one in lockstep)
     rows.append([f"lockstep with the reference, {len(lockstep)} scenes, {sum(one['frames'] for one in lockstep)} frames",
