@@ -33,7 +33,7 @@ constexpr double kDamping = 20;       // [1/s] so that it is at rest by then
 constexpr double kAfterwards = 0.16;  // [s]
 constexpr double kKick = 0.1;         // [m/s]
 constexpr int64_t kFeltFrames = 5;    // in which a kick is looked for
-constexpr int64_t kFragment = 8;      // a piece with fewer particles is none that anybody wanted
+constexpr int64_t kFragment = 8;      // pieces of fewer units are fragments
 constexpr double kTimeLimit = 1800;   // [s] of a plugin for one run
 
 // What the blade's edge sweeps on the way to each frame of a run, and on the way to the one before: tissue that moves
@@ -127,8 +127,15 @@ Body corners_of_cells(Body body) {
   return kept;
 }
 
+// E = ½ ρ k c h² for cores of c nodes a side.
+void take_modulus(const Scene& spec, double youngs_modulus, Kidney& kidney) {
+  const double h = kidney.setup.body.grid.spacing, c = spec.clusters.side;
+  kidney.youngs_modulus = youngs_modulus;
+  kidney.setup.step.stiffness = 2 * youngs_modulus / (spec.body.density * c * h * h);
+}
+
 // A block that spins: 12 × 6 × 6 particles, 60 frames without gravity.
-Kidney make_spinning_block(double youngs_modulus) {
+Kidney make_spinning_block() {
   Scene spec = embedded_scene("kidney_101096");
   spec.name = "spinning block";
   spec.body = {};
@@ -147,9 +154,7 @@ Kidney make_spinning_block(double youngs_modulus) {
   Kidney block;
   block.setup = std::move(built.setup);
   block.start = std::move(built.state);
-  block.youngs_modulus = youngs_modulus;
-  const double h = block.setup.body.grid.spacing, c = spec.clusters.side;
-  block.setup.step.stiffness = 2 * youngs_modulus / (spec.body.density * c * h * h);
+  take_modulus(spec, 1e4, block);
   Vec3 centre;
   for (const Vec3 x : block.start.x) centre += x / static_cast<double>(block.start.x.size());
   for (std::size_t i = 0; i < block.start.x.size(); ++i)
@@ -158,8 +163,6 @@ Kidney make_spinning_block(double youngs_modulus) {
   block.scene.blade.assign(at(4 * block.scene.frames), Vec3{std::nan(""), std::nan(""), std::nan("")});
   return block;
 }
-constexpr double kSpinModulus = 1e4;  // [Pa]
-
 // About the centre of mass, of what exists.
 Vec3 angular_momentum(const io::ArrayFile& frame, const std::vector<double>& mass_given) {
   const auto of = [&](const char* name) { return find_array(frame.arrays, name); };
@@ -183,10 +186,14 @@ Vec3 angular_momentum(const io::ArrayFile& frame, const std::vector<double>& mas
   return sum;
 }
 
-std::optional<double> spin_kept_in(const MethodRun& run, const scenes::Scene& scene) {
+// Of a free block that spins without gravity: its angular momentum at the end, as a share of that at the start. Nothing
+// where the method refuses it or tells no velocities.
+std::optional<double> spin_kept(Method& method) {
+  const Kidney block = make_spinning_block();
+  const MethodRun run = method.run(block, block.scene.frames, nullptr);
   if (!run.refused.empty() || find_array(run.frames.back().arrays, "velocities") == nullptr) return std::nullopt;
-  const Vec3 first = angular_momentum(run.frames.front(), scene.mass),
-             last = angular_momentum(run.frames.back(), scene.mass);
+  const Vec3 first = angular_momentum(run.frames.front(), block.scene.mass),
+             last = angular_momentum(run.frames.back(), block.scene.mass);
   return dot(last, first) / dot(first, first);
 }
 
@@ -233,11 +240,6 @@ class OwnMethod : public Method {
       keep(state, at(frame));
     }
     return run;
-  }
-
-  std::optional<double> spin_kept() override {
-    const Kidney block = make_spinning_block(kSpinModulus);
-    return spin_kept_in(run(block, block.scene.frames, nullptr), block.scene);
   }
 
  private:
@@ -299,11 +301,6 @@ class PluginMethod : public Method {
       run.seconds.push_back(run.timed_by_judge ? whole / static_cast<double>(frames - 1) : seconds->number(f));
     }
     return run;
-  }
-
-  std::optional<double> spin_kept() override {
-    const Kidney block = make_spinning_block(kSpinModulus);
-    return spin_kept_in(run(block, block.scene.frames, nullptr), block.scene);
   }
 
  private:
@@ -400,9 +397,7 @@ Kidney make_kidney(int64_t particles, double youngs_modulus) {
   Kidney kidney;
   kidney.setup = std::move(built.setup);
   kidney.start = std::move(built.state);
-  kidney.youngs_modulus = youngs_modulus;
-  const double h = kidney.setup.body.grid.spacing, c = spec.clusters.side;
-  kidney.setup.step.stiffness = 2 * youngs_modulus / (spec.body.density * c * h * h);
+  take_modulus(spec, youngs_modulus, kidney);
   kidney.scene = scene_of(kidney.setup, kidney.start);
   kidney.scene.blade = swept_by_edge(kidney.setup);
   for (int64_t f = 0; f < kidney.scene.frames; ++f) {
@@ -506,7 +501,7 @@ nlohmann::json row_of(Method& method, const Kidney& kidney, const ConvergedKidne
     row["felt"]["blade_in"] = felt(method, kidney, run, piece, kidney.last_cut);
     row["felt"]["withdrawn"] = felt(method, kidney, run, piece, kidney.last_cut + 2);
   }
-  const std::optional<double> spin = method.spin_kept();
+  const std::optional<double> spin = spin_kept(method);
   if (spin) row["spin_kept"] = *spin;
   return row;
 }

@@ -52,8 +52,6 @@ class Method {
   virtual std::string settings() const = 0;
   // Of the kidney's first frames, as many; with a kick or without.
   virtual MethodRun run(const Kidney& kidney, int64_t frames, const MethodKick* kick) = 0;
-  // A free block that spins without gravity: its angular momentum at the end, as a share of that at the start.
-  virtual std::optional<double> spin_kept() = 0;
 };
 // This method with its rules or another's, by a backend.
 std::unique_ptr<Method> make_own_method(const std::string& backend, const Baseline& baseline, int32_t iterations);

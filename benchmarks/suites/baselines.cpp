@@ -20,7 +20,7 @@ void add_methods(const BaselinesOptions& options, Report& report, const Progress
   for (const int32_t iterations : options.iterations) {
     methods.push_back(make_own_method(options.backend, baselines().front(), iterations));
   }
-  // Rules that are this method's otherwise: with the most iterations.
+  // Other rules of removal, with the most iterations.
   for (const Baseline& baseline : baselines()) {
     const bool is_ours = &baseline == &baselines().front();
     const bool is_about_removal = baseline.deletion != Deletion::none || baseline.remove != RemovedEnds::both;
@@ -59,6 +59,9 @@ void add_methods(const BaselinesOptions& options, Report& report, const Progress
 
 nlohmann::json run_baselines(const BaselinesOptions& options, const Progress& progress) {
   require_timed_backend(options.backend);
+  require_option(!options.with.empty() || (options.truth.empty() && options.save.empty()), "--with",
+                 "without it no other simulator is asked, and --truth and --save mean nothing",
+                 "give a plugin, or leave them out");
   Report report("baselines", options.backend,
                 {{"particles_asked", options.particles},
                  {"seed", options.seed},

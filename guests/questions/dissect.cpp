@@ -142,6 +142,48 @@ std::string difference_of_runs(const Question& question, const Arrays& one, cons
   return "";
 }
 
+Scene part_of(const Scene& scene, std::vector<uint8_t> keep) {
+  // Where all particles are corners of cells they stay so.
+  const auto cells_left = [&](const std::vector<int32_t>& cells, std::size_t corners, const auto& visit) {
+    for (std::size_t k = 0; k + corners <= cells.size(); k += corners) {
+      const auto cell = std::span(cells).subspan(k, corners);
+      if (std::all_of(cell.begin(), cell.end(), [&](int32_t i) { return keep[at(i)] != 0; })) visit(cell);
+    }
+  };
+  std::vector<uint8_t> is_corner(keep.size(), 0), was_corner(keep.size(), 0);
+  for (const int32_t i : scene.tetrahedra) was_corner[at(i)] = 1;
+  if (std::find(was_corner.begin(), was_corner.end(), 0) == was_corner.end()) {
+    cells_left(scene.tetrahedra, 4, [&](std::span<const int32_t> cell) {
+      for (const int32_t i : cell) is_corner[at(i)] = 1;
+    });
+    keep = is_corner;
+  }
+  Scene part = scene;
+  std::vector<int32_t> number(keep.size(), -1);
+  part.rest.clear(), part.velocity.clear(), part.kick.clear(), part.mass.clear(), part.held.clear(), part.node.clear();
+  part.edges.clear(), part.tetrahedra.clear(), part.hexahedra.clear();
+  for (std::size_t i = 0; i < keep.size(); ++i) {
+    if (keep[i] == 0) continue;
+    number[i] = static_cast<int32_t>(part.count());
+    part.rest.push_back(scene.rest[i]);
+    part.velocity.push_back(scene.velocity[i]);
+    part.kick.push_back(scene.kick[i]);
+    part.mass.push_back(scene.mass[i]);
+    part.held.push_back(scene.held[i]);
+    part.node.insert(part.node.end(), &scene.node[3 * i], &scene.node[3 * i] + 3);
+  }
+  for (const auto& [a, b] : scene.edges) {
+    if (keep[at(a)] != 0 && keep[at(b)] != 0) part.edges.push_back({number[at(a)], number[at(b)]});
+  }
+  cells_left(scene.tetrahedra, 4, [&](std::span<const int32_t> cell) {
+    for (const int32_t i : cell) part.tetrahedra.push_back(number[at(i)]);
+  });
+  cells_left(scene.hexahedra, 8, [&](std::span<const int32_t> cell) {
+    for (const int32_t i : cell) part.hexahedra.push_back(number[at(i)]);
+  });
+  return part;
+}
+
 std::vector<Question> simpler_scenes(const Question& question) {
   const Scene scene = scene_of(question.given);
   std::vector<Question> simpler;

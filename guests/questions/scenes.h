@@ -50,8 +50,6 @@ struct Scene {
 Arrays arrays_of(const Scene& scene);
 // From the nodes of the particles: cubes of which all corners are particles, and six tetrahedra in each.
 void add_cells(Scene& scene);
-// The particles that are kept, with their edges and cells. Where all particles are corners of tetrahedra they stay so.
-Scene part_of(const Scene& scene, std::vector<uint8_t> keep);
 // The question to a plugin, in its precision and with its promises.
 Question question_of(const Scene& scene, std::string kind, const PluginInfo& plugin);
 // Requires that problem_of_scene() finds none.

@@ -792,7 +792,7 @@ class RunJudge::Implementation {
       Part& part = parts[label[at(unit_particle(unit))]][piece];
       if (part.units++ == 0) part.first = unit;
     }
-    // Those that are coupled to more units of another piece than there are of their own.
+    // Units that are in no body's largest piece.
     int64_t across = 0;
     std::array<int32_t, 2> example = {-1, -1};
     for (const auto& [component, of] : parts) {

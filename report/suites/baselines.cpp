@@ -1,3 +1,5 @@
+#include <fmt/ranges.h>
+
 #include "model/io/columns.h"
 #include "report/suites/suites.h"
 
@@ -23,12 +25,6 @@ RowColumns columns_of_baselines() {
           {"clusters", "{clusters_before} -> {clusters}", Shown::terminal}};
 }
 
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
-}
-
 RowColumns columns_of_methods() {
   return {{"method", "{name}"},
           {"settings", "{settings}", Shown::page},
@@ -44,8 +40,10 @@ RowColumns columns_of_methods() {
           {"lost", "{lost:.2g}"},
           {"spin", "{spin_kept:.3g}"},
           {"fragments", "{fragments}", Shown::page},
-          {"fails",
-           [](const Field& row) { return row["refused"].is_nothing() ? joined(row["fails"].texts()) : "refused"; }}};
+          {"fails", [](const Field& row) {
+             return row["refused"].is_nothing() ? fmt::format("{}", fmt::join(row["fails"].texts(), ", "))
+                                                : std::string("refused");
+           }}};
 }
 
 void add_methods(Sheet& sheet, const Field& document) {

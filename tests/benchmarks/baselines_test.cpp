@@ -97,6 +97,7 @@ TEST_F(BenchBaselines, AsksOtherSimulators) {
   EXPECT_EQ(cutproof("check runs/5_springs_600").status, 1) << "the judge of saved runs says the same: it is not cut";
   EXPECT_EQ(cutproof("report out.json -o page.html").status, 0);
   EXPECT_NE(read("page.html").find("Table 3"), std::string::npos);
+  EXPECT_EQ(cutproof("bench baselines --backend host --truth " + springs).status, 2) << "there is nobody to compare";
   const Outcome none = cutproof("bench baselines --backend host --with nothing.so");
   EXPECT_EQ(none.status, 2) << none.output;
 }
