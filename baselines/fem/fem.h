@@ -23,6 +23,7 @@ struct Settings {
   int solver = 0;              // of the CPU program: 0 CHOLMOD, 1 conjugate gradients
   double tolerance = 1e-6;     // of conjugate gradients: residual in the preconditioner's norm, relative
   int iterations = 2000;       // of them at most
+  int grids = 8;               // coarser ones of the kernels' multigrid, at most; 0: block Jacobi alone
   int refine = 1;              // each hexahedron becomes refine³
   bool removes_cells = false;  // the blade deletes the cells that it meets, and cuts no links
 };
@@ -61,6 +62,9 @@ struct Linearised {
   Matrix24 stiffness;
 };
 Linearised linearise(const Element& element, Lame lame, const Corners& x, bool projected = true);
+
+// The greatest eigenvalue of D⁻¹K at rest, D the 3 × 3 diagonal blocks of K. It bounds that of any mesh of such cells.
+double greatest_of_jacobi(const Corners& rest, Lame lame);
 
 // Places of the mesh's nodes in equilibrium with `load` [p] N, from the places `x` [p] m; held nodes stay. Newton's
 // method with halved steps while the energy would grow. Throws std::runtime_error where it does not converge.

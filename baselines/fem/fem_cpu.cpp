@@ -1,5 +1,6 @@
 // The method in double precision, written to be read: the oracle of the kernels.
 #include <Eigen/CholmodSupport>
+#include <Eigen/Eigenvalues>
 #include <Eigen/IterativeLinearSolvers>
 #include <Eigen/SVD>
 #include <Eigen/Sparse>
@@ -26,6 +27,7 @@ std::map<std::string, double> known_parameters() {
           {"solver", s.solver},
           {"tolerance", s.tolerance},
           {"iterations", s.iterations},
+          {"grids", s.grids},
           {"refine", s.refine},
           {"remove", s.removes_cells ? 1 : 0}};
 }
@@ -59,6 +61,7 @@ Settings settings_of(const Parameters& parameters, double spacing) {
   s.solver = whole("solver", 0, 1);
   s.tolerance = within("tolerance", 1e-15, 0.5);
   s.iterations = whole("iterations", 1, 1'000'000);
+  s.grids = whole("grids", 0, 30);
   s.refine = whole("refine", 1, 16);
   s.removes_cells = whole("remove", 0, 1) == 1;
   return s;
@@ -178,6 +181,15 @@ Linearised linearise(const Element& element, Lame lame, const Corners& x, bool p
   }
   result.stiffness += lame.lambda / element.volume * volumetric * volumetric.transpose();
   return result;
+}
+
+double greatest_of_jacobi(const Corners& rest, Lame lame) {
+  const Matrix24 stiffness = linearise(element_of(rest), lame, rest).stiffness;
+  Matrix24 diagonal = Matrix24::Zero();
+  for (int k = 0; k < 24; k += 3) diagonal.block<3, 3>(k, k) = stiffness.block<3, 3>(k, k);
+  return Eigen::GeneralizedSelfAdjointEigenSolver<Matrix24>(stiffness, diagonal, Eigen::EigenvaluesOnly)
+      .eigenvalues()
+      .maxCoeff();
 }
 
 double energy_of(const Mesh& mesh, Lame lame, const Vec3& gravity, const Frame& frame) {

@@ -427,6 +427,134 @@ TEST(FemMesh, MassesAreThoseOfTheSceneOrOfADensity) {
   EXPECT_NEAR(total(lumped_mass(mesh_of(scene, 2, 500))), 7 + 500 * 8e-6, 1e-12);
 }
 
+// --- Coarser grids ---------------------------------------------------------------------------------------------------
+
+// A mesh that is cut by a wall across x, and its grids; the last one first.
+std::vector<Grid> grids_of(const Scene& scene, const Patch& patch, Mesh& mesh,
+                           std::vector<std::vector<int32_t>>& parents) {
+  mesh = mesh_of(scene, 1, 0);
+  const auto centre = [&](int32_t c) {
+    return Vec3(corners_of(mesh.rest, mesh.cells[static_cast<std::size_t>(c)]).colwise().mean());
+  };
+  for (std::size_t l = 0; l < mesh.links.size(); ++l) {
+    if (crosses(patch, centre(mesh.links[l][0]), centre(mesh.links[l][1]))) cut_link(mesh, l);
+  }
+  split(mesh);
+  std::vector<int32_t> corners;
+  for (const auto& cell : mesh.cells) corners.insert(corners.end(), cell.begin(), cell.end());
+  std::vector<Grid> grids = {finest(mesh, corners, mesh.rest.size())};
+  while (grids.back().place.size() > 1 && grids.size() < 5) {
+    grids.push_back(coarser(grids.back(), parents.emplace_back()));
+  }
+  return grids;
+}
+
+TEST(FemGrids, CutsStayCutsInCoarserGrids) {
+  // The wall lies inside of boxes of two, four and eight cells. It parts the block, or two thirds of it.
+  const Scene scene = block({8, 6, 4}, Vec3(1, 1, 1));
+  for (const bool is_whole : {true, false}) {
+    Mesh mesh;
+    std::vector<std::vector<int32_t>> parents;
+    const std::vector<Grid> grids = grids_of(scene, wall(3.2, is_whole ? -10 : 1.9, 10), mesh, parents);
+    ASSERT_EQ(grids.size(), is_whole ? 5u : 4u);  // until nothing is left to join
+    for (std::size_t level = 0; level < grids.size(); ++level) {
+      const Grid& grid = grids[level];
+      std::vector<std::array<int32_t, 2>> joined;
+      for (const auto& cell : grid.corners) {
+        for (const int32_t i : cell) joined.push_back({cell[0], i});
+      }
+      const std::vector<int32_t> piece = components(static_cast<int32_t>(grid.nodes), joined);
+      EXPECT_EQ(*std::max_element(piece.begin(), piece.end()), is_whole ? 1 : 0) << level;
+      // Boxes of two: x 0 1 | 2 3 4.., so the cut box has two cells for y >= 2 (or everywhere), and the wall's nodes
+      // are doubled but for the tip's.
+      if (level == 1) {
+        EXPECT_EQ(grid.place.size(), 4u * 3 * 2 + (is_whole ? 6 : 4));
+        EXPECT_EQ(grid.nodes, 5u * 4 * 3 + (is_whole ? 24u : 12u));
+      }
+    }
+  }
+}
+
+// The operators of coarse cells, against Pᵀ (M + s K) P of the program in double precision.
+TEST(FemGrids, CoarseOperatorsAreGalerkins) {
+  Draw draw(18);
+  const double h = 0.01, dt = 0.01;
+  Scene scene = block({5, 4, 3}, Vec3(h, h, h));
+  for (std::size_t i = 0; i < scene.rest.size(); ++i) {
+    scene.velocity[i] = draw.vector(0.1 * h / dt);
+    scene.held[i] = scene.rest[i][0] < 0.5 * h ? 1 : 0;
+  }
+  const Patch patch = wall(2.7 * h, 1.8 * h, 10);  // two thirds of the block
+  Mesh mesh;
+  std::vector<std::vector<int32_t>> parents;
+  const std::vector<Grid> grids = grids_of(scene, patch, mesh, parents);
+  ASSERT_EQ(grids.size(), 4u);
+  Kernels<Host> simulator(scene, given("youngs_modulus=30000,poisson_ratio=0.3,steps=1"));
+  simulator.cut({patch});
+  simulator.advance(dt);
+  const Frame before = simulator.frame(true);
+  ASSERT_EQ(before.hexahedra, mesh.cells);
+  simulator.advance(dt);
+  ASSERT_EQ(simulator.multigrid().levels(), 2u);
+
+  const auto unknowns = static_cast<Eigen::Index>(3 * mesh.rest.size());
+  Eigen::MatrixXd a = Eigen::MatrixXd::Zero(unknowns, unknowns);
+  for (const auto& cell : mesh.cells) {
+    const Matrix24 k =
+        linearise(element_of(corners_of(mesh.rest, cell)), lame_of(30000, 0.3), corners_of(before.position, cell))
+            .stiffness;
+    for (int row = 0; row < 8; ++row) {
+      for (int column = 0; column < 8; ++column)
+        a.block<3, 3>(3 * cell[static_cast<std::size_t>(row)], 3 * cell[static_cast<std::size_t>(column)]) +=
+            dt * dt * k.block<3, 3>(3 * row, 3 * column);
+    }
+  }
+  const std::vector<double> mass = lumped_mass(mesh);
+  for (std::size_t i = 0; i < mass.size(); ++i)
+    a.diagonal().segment<3>(static_cast<Eigen::Index>(3 * i)).array() += mass[i];
+
+  std::vector<int32_t> ancestor(mesh.cells.size());
+  std::iota(ancestor.begin(), ancestor.end(), 0);
+  for (std::size_t level = 1; level <= 2; ++level) {
+    const Grid& grid = grids[level];
+    // Trilinear in boxes of 2^level cells.
+    Eigen::MatrixXd p = Eigen::MatrixXd::Zero(unknowns, static_cast<Eigen::Index>(3 * grid.nodes));
+    for (std::size_t c = 0; c < mesh.cells.size(); ++c) {
+      ancestor[c] = parents[level - 1][static_cast<std::size_t>(ancestor[c])];
+      const auto box = static_cast<std::size_t>(ancestor[c]);
+      for (const int32_t i : mesh.cells[c]) {
+        for (int of_box = 0; of_box < 8 && mesh.held[static_cast<std::size_t>(i)] == 0; ++of_box) {
+          double weight = 1;
+          for (int k = 0; k < 3; ++k)
+            weight *= 1 - std::abs(mesh.rest[static_cast<std::size_t>(i)][k] / h / (level == 1 ? 2 : 4) -
+                                   grid.place[box][static_cast<std::size_t>(k)] - kEnds[of_box][k]);
+          const int32_t coarse = grid.corners[box][static_cast<std::size_t>(of_box)];
+          p.block<3, 3>(3 * i, 3 * coarse) = weight * Matrix3d::Identity();
+        }
+      }
+    }
+    const Eigen::MatrixXd wanted = p.transpose() * a * p;
+    Eigen::MatrixXd found = Eigen::MatrixXd::Zero(wanted.rows(), wanted.cols());
+    const std::vector<float> entries = simulator.multigrid().entries(level - 1);
+    const std::size_t cells = grid.place.size();
+    ASSERT_EQ(entries.size(), 36 * 9 * cells);
+    for (std::size_t c = 0; c < cells; ++c) {
+      for (int row = 0; row < 24; ++row) {
+        for (int column = 0; column < 24; ++column) {
+          const int b = std::max(row / 3, column / 3), corner = std::min(row / 3, column / 3);
+          const bool is_upper = row / 3 <= column / 3;
+          const int pair = 8 * corner - corner * (corner + 1) / 2 + b;
+          const int entry = is_upper ? 3 * (row % 3) + column % 3 : 3 * (column % 3) + row % 3;
+          found(3 * grid.corners[c][static_cast<std::size_t>(row / 3)] + row % 3,
+                3 * grid.corners[c][static_cast<std::size_t>(column / 3)] + column % 3) +=
+              static_cast<double>(entries[static_cast<std::size_t>(9 * pair + entry) * cells + c]);
+        }
+      }
+    }
+    EXPECT_LT((found - wanted).norm(), 1e-6 * wanted.norm()) << level;
+  }
+}
+
 // --- Parts of kernels ------------------------------------------------------------------------------------------------
 
 TEST(FemKernels, RotationsAreTheBestAlsoOfInvertedAndFlatCells) {
@@ -893,6 +1021,23 @@ TEST(FemCpu, LargeAndSmallSystemsAreSolvedAlike) {
   const Frame one = simulator->frame(true), other = gradients->frame(true);
   for (std::size_t i = 0; i < scene.rest.size(); ++i)
     ASSERT_LT((one.position[i] - other.position[i]).norm(), 1e-9 * 0.01);
+}
+
+// Iterations of conjugate gradients for a step of a beam with a cut, a block of 4 n × 2 n × 2 n cells.
+template <class Executor>
+double iterations_of(int n, const std::string& parameters) {
+  Scene scene = block({4 * n, 2 * n, 2 * n}, Vec3(0.01, 0.01, 0.01) / n);
+  for (std::size_t i = 0; i < scene.rest.size(); ++i) scene.held[i] = scene.rest[i][0] < 0.0049 ? 1 : 0;
+  Kernels<Executor> simulator(scene, given("youngs_modulus=30000,steps=1,density=1000" + parameters));
+  simulator.cut({wall(0.0221, 0.0101)});
+  simulator.advance(0.004);
+  return static_cast<double>(simulator.iterations());
+}
+TEST(FemMultigrid, IterationsDoNotGrowWithTheNumberOfCells) {
+  const double coarse = iterations_of<Host>(2, ""), fine = iterations_of<Host>(4, "");
+  EXPECT_LE(fine, coarse + 2);
+  EXPECT_LE(fine, 14);
+  EXPECT_GE(iterations_of<Host>(4, ",grids=0"), 2.5 * fine);
 }
 
 TEST_P(FemInSinglePrecision, LargeComponentsAreSummedByPieces) {
