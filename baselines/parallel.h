@@ -3,6 +3,7 @@
 // An executor (Host, or Device where nvcc compiles) has memory and these operations; a simulator is a template over it.
 //   for_each(n, f)        calls f(i) for i in 0 .. n - 1, in any order or at once: f must not depend on what another
 //                         call writes. f is a lambda [=] BASELINES_KERNEL(int64_t i), over pointers.
+//   for_each(times, count, f)  likewise for times * *count calls; `count` lies in the executor's memory
 //   sort(keys, values)    ascending; equal keys keep their order
 //   scan(counts, starts)  starts[i] = counts[0] + .. + counts[i - 1]; starts has one entry more
 //   sums(values, starts, out)  out[s] = values[starts[s]] + .. + values[starts[s + 1] - 1], in an order that depends on
@@ -48,6 +49,10 @@ class Host {
   void for_each(std::size_t n, F f) {
     for (std::size_t i = 0; i < n; ++i) f(static_cast<int64_t>(i));
   }
+  template <class F>
+  void for_each(std::size_t times, const int32_t* count, F f) {
+    for_each(times * static_cast<std::size_t>(*count), f);
+  }
   void sort(Array<uint32_t>& keys, Array<int32_t>& values) {
     std::vector<int32_t> order(keys.size());
     std::iota(order.begin(), order.end(), 0);
@@ -86,6 +91,11 @@ template <class F>
 __global__ void each(int64_t n, F f) {
   const int64_t i = int64_t{blockIdx.x} * blockDim.x + threadIdx.x;
   if (i < n) f(i);
+}
+template <class F>
+__global__ void each(int64_t times, const int32_t* count, F f) {
+  const int64_t n = times * *count, stride = int64_t{gridDim.x} * blockDim.x;
+  for (int64_t i = int64_t{blockIdx.x} * blockDim.x + threadIdx.x; i < n; i += stride) f(i);
 }
 
 class Device {
@@ -129,19 +139,26 @@ class Device {
   template <class F>
   void for_each(std::size_t n, F f) {
     if (n == 0) return;
-    constexpr unsigned kThreads = 256;
     each<<<static_cast<unsigned>((n + kThreads - 1) / kThreads), kThreads>>>(static_cast<int64_t>(n), f);
     check(cudaGetLastError());
   }
+  template <class F>
+  void for_each(std::size_t times, const int32_t* count, F f) {
+    constexpr unsigned kBlocks = 2048;  // fill a device; threads go on in strides
+    each<<<kBlocks, kThreads>>>(static_cast<int64_t>(times), count, f);
+    check(cudaGetLastError());
+  }
   void sort(Array<uint32_t>& keys, Array<int32_t>& values) {
-    Array<uint32_t> sorted_keys(keys.size());
-    Array<int32_t> sorted_values(values.size());
+    if (spare_keys_.size() != keys.size()) {
+      spare_keys_ = Array<uint32_t>(keys.size());
+      spare_values_ = Array<int32_t>(keys.size());
+    }
     with_room([&](void* room, std::size_t& bytes) {
-      return cub::DeviceRadixSort::SortPairs(room, bytes, keys.data(), sorted_keys.data(), values.data(),
-                                             sorted_values.data(), static_cast<int>(keys.size()));
+      return cub::DeviceRadixSort::SortPairs(room, bytes, keys.data(), spare_keys_.data(), values.data(),
+                                             spare_values_.data(), static_cast<int>(keys.size()));
     });
-    keys = std::move(sorted_keys);
-    values = std::move(sorted_values);
+    std::swap(keys, spare_keys_);
+    std::swap(values, spare_values_);
   }
   void scan(const Array<int32_t>& counts, Array<int32_t>& starts) {
     check(cudaMemset(starts.data(), 0, sizeof(int32_t)));
@@ -160,6 +177,7 @@ class Device {
   void finish() { check(cudaDeviceSynchronize()); }
 
  private:
+  static constexpr unsigned kThreads = 256;
   template <class F>
   void with_room(F call) {
     std::size_t bytes = 0;
@@ -168,6 +186,8 @@ class Device {
     check(call(room_.data(), bytes));
   }
   Array<unsigned char> room_{1};
+  Array<uint32_t> spare_keys_;  // [keys of the last sort]
+  Array<int32_t> spare_values_;
 };
 
 #endif

@@ -286,7 +286,7 @@ struct Program : Simulator {
     numbers = Array<int32_t>(n + 1);
     first = Array<int32_t>(n + 1);
     boxes = Array<Box>(n / kChunk + 2);
-    outcome = Array<int32_t>(2);
+    is_fine = Array<int32_t>(std::vector<int32_t>(1, 1));
     neighbour = Array<int32_t>(125 * n);
     slot = Array<int32_t>(27 * n);
     marks = Array<uint32_t>(27 * n);
@@ -430,6 +430,7 @@ struct Program : Simulator {
       box[c + 1] = sum;
     });
     const int64_t labels = label_count;
+    int32_t* const all_fine = is_fine.data();
     executor.for_each(1, [=] BASELINES_KERNEL(int64_t) {
       Box sum = box[1];
       for (int64_t c = 2; c <= chunks; ++c) {
@@ -441,7 +442,7 @@ struct Program : Simulator {
       }
       double all = static_cast<double>(labels);
       for (int a = 0; a < 3; ++a) all *= sum.high[a] - sum.low[a] + 1;
-      if (all >= 4294967295.0) sum.is_fine = 0;
+      if (!(all < 4294967295.0 && sum.is_fine != 0)) all_fine[0] = 0;
       box[0] = sum;
     });
     uint32_t* const key = keys.data();
@@ -458,21 +459,14 @@ struct Program : Simulator {
     executor.for_each(n, [=] BASELINES_KERNEL(int64_t i) { head[i] = i == 0 || sorted[i] != sorted[i - 1] ? 1 : 0; });
     executor.scan(heads, numbers);
     const int32_t* const number = numbers.data();
-    int32_t *const begin = first.data(), *const result = outcome.data();
+    int32_t* const begin = first.data();
     executor.for_each(n, [=] BASELINES_KERNEL(int64_t i) {
       if (head[i] != 0) begin[number[i]] = static_cast<int32_t>(i);
-      if (i + 1 == count) {
-        begin[number[count]] = static_cast<int32_t>(count);
-        result[0] = number[count];
-        result[1] = box[0].is_fine;
-      }
+      if (i + 1 == count) begin[number[count]] = static_cast<int32_t>(count);
     });
-    const std::vector<int32_t> found = outcome.copy();
-    if (found[1] == 0)
-      throw std::runtime_error(
-          "points are no longer finite, or too far apart for a grid; take more steps, or soften it");
-    cells = static_cast<std::size_t>(found[0]);
   }
+  // How many cells have points, in the executor's memory: the host does not wait for it.
+  const int32_t* cells() const { return numbers.data() + n; }
   static BASELINES_HOST_DEVICE uint32_t key_of(const Box& box, int32_t of, int i, int j, int k) {
     const auto size = [&](int a) { return static_cast<uint32_t>(box.high[a] - box.low[a] + 1); };
     return ((static_cast<uint32_t>(of) * size(2) + static_cast<uint32_t>(k - box.low[2])) * size(1) +
@@ -487,10 +481,10 @@ struct Program : Simulator {
     const int32_t *const who = order.data(), *const begin = first.data(), *const of = label.data();
     const uint32_t* const key = keys.data();
     const auto dx = static_cast<float>(settings.cell);
-    const auto count = static_cast<int32_t>(cells);
+    const int32_t* const count = cells();
     int32_t *const beside_cell = neighbour.data(), *const to = slot.data();
     // The cells around a cell, by bisection.
-    executor.for_each(125 * cells, [=] BASELINES_KERNEL(int64_t t) {
+    executor.for_each(125, cells(), [=] BASELINES_KERNEL(int64_t t) {
       const int64_t c = t / 125;
       const int32_t p = who[begin[c]];
       const Place place = place_in_grid(at[p], dx);
@@ -501,7 +495,7 @@ struct Program : Simulator {
         if (node[a] < box->low[a] || node[a] > box->high[a]) return;
       }
       const uint32_t wanted = key_of(*box, of[p], node[0], node[1], node[2]);
-      int32_t low = 0, high = count;
+      int32_t low = 0, high = *count;
       while (low + 1 < high) {
         const int32_t middle = (low + high) / 2;
         (key[begin[middle]] <= wanted ? low : high) = middle;
@@ -510,7 +504,7 @@ struct Program : Simulator {
     });
     // A node is that of the first place of a stencil in which a cell has it.
     uint32_t* const mark = marks.data();
-    executor.for_each(27 * cells, [=] BASELINES_KERNEL(int64_t t) {
+    executor.for_each(27, cells(), [=] BASELINES_KERNEL(int64_t t) {
       const int64_t c = t / 27;
       const int k = static_cast<int>(t % 27);
       for (int other = 0; other <= k; ++other) {
@@ -576,7 +570,7 @@ struct Program : Simulator {
     Node* const node = nodes.data();
     const auto dx = static_cast<float>(settings.cell);
     const V3 fall = dt * single(scene.gravity);
-    executor.for_each(27 * cells, [=] BASELINES_KERNEL(int64_t t) {
+    executor.for_each(27, cells(), [=] BASELINES_KERNEL(int64_t t) {
       if (to[t] != t) return;
       const int64_t c = t / 27;
       const int k = static_cast<int>(t % 27);
@@ -682,6 +676,9 @@ struct Program : Simulator {
     frame.contact_impulse = Vec3::Zero();
     if (n == 0) return frame;
     prepare(plates_of(settings.substeps), 0);
+    if (is_fine.copy()[0] == 0)
+      throw std::runtime_error(
+          "points are no longer finite, or too far apart for a grid; take more steps, or soften it");
     const std::vector<V3> at = x.copy(), speed = v.copy(), given = impulse.copy();
     const std::vector<M3> c = affine.copy();
     const std::vector<int32_t> who = order.copy(), number = numbers.copy(), to = slot.copy();
@@ -698,7 +695,7 @@ struct Program : Simulator {
       if (!frame.velocity[p].allFinite() || !frame.spin[p].allFinite())
         throw std::runtime_error("a point is no longer finite; take more steps, or soften it");
     }
-    std::vector<std::vector<std::pair<int32_t, double>>> at_node(27 * cells);
+    std::vector<std::vector<std::pair<int32_t, double>>> at_node(27 * static_cast<std::size_t>(number[n]));
     for (std::size_t i = 0; i < n; ++i) {
       for (int k = 0; k < 27; ++k) {
         const auto s = static_cast<std::size_t>(
@@ -727,7 +724,6 @@ struct Program : Simulator {
   const std::size_t n;
   int frame_number = 0;
   int64_t label_count = 1;
-  std::size_t cells = 0;  // that have points
 
   Array<V3> x, v;                        // [n] m, m/s
   Array<M3> affine, deformation;         // [n] C [1/s], F
@@ -742,7 +738,7 @@ struct Program : Simulator {
   Array<int32_t> order;                  // [n] points in the order of their cells
   Array<int32_t> heads, numbers, first;  // first of a cell; cells before; by cell its first in `order`
   Array<Box> boxes;                      // of all cells, then of chunks of points
-  Array<int32_t> outcome;                // cells, and whether all is fine
+  Array<int32_t> is_fine;                // 1 until points are no longer finite, or too far apart for keys
   Array<int32_t> neighbour;              // [cells x 125] cells around a cell, or -1
   Array<int32_t> slot;                   // [cells x 27] where the data of a cell's node are
   Array<uint32_t> marks;                 // [cells x 27] sides of nodes

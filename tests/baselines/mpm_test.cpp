@@ -867,6 +867,29 @@ TEST_P(Kernels, RunsStayBesideThoseInDoublePrecision) {
   }
 }
 
+// On a device each allocation and each copy to the host waits for all kernels before it.
+struct Counting : Host {
+  inline static int waits = 0;
+  template <class T>
+  struct Array : Host::Array<T> {
+    explicit Array(std::size_t size = 0) : Host::Array<T>(size) { waits += size > 0; }
+    explicit Array(const std::vector<T>& values) : Host::Array<T>(values) { ++waits; }
+    std::vector<T> copy() const {
+      ++waits;
+      return Host::Array<T>::copy();
+    }
+  };
+};
+
+TEST(MpmKernels, SubstepsDoNotWait) {
+  const Scene scene = drawn_scene(500);
+  mpm_kernels::Program<Counting> program(scene, given());
+  program.advance(scene.frame_time);
+  Counting::waits = 0;
+  program.advance(scene.frame_time);
+  EXPECT_EQ(Counting::waits, 0);
+}
+
 // --- Hard cases ---
 
 // Finite, or refused with a sentence.
