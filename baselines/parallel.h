@@ -18,9 +18,9 @@
 #include <vector>
 
 #ifdef __CUDACC__
-#include <cub/device/device_radix_sort.cuh>
-#include <cub/device/device_scan.cuh>
-#include <cub/device/device_segmented_reduce.cuh>
+#include <cuda_runtime.h>
+
+#include <new>
 #define BASELINES_HOST_DEVICE __host__ __device__
 #else
 #define BASELINES_HOST_DEVICE
@@ -68,10 +68,9 @@ class Host {
     starts.data()[0] = 0;
     for (std::size_t i = 0; i < counts.size(); ++i) starts.data()[i + 1] = starts.data()[i] + counts.data()[i];
   }
-  template <class T>
-  void sums(const Array<T>& values, const Array<int32_t>& starts, Array<T>& out) {
+  void sums(const Array<float>& values, const Array<int32_t>& starts, Array<float>& out) {
     for (std::size_t s = 0; s + 1 < starts.size(); ++s) {
-      out.data()[s] = std::accumulate(values.data() + starts.data()[s], values.data() + starts.data()[s + 1], T{});
+      out.data()[s] = std::accumulate(values.data() + starts.data()[s], values.data() + starts.data()[s + 1], 0.0f);
     }
   }
   void finish() {}
@@ -148,43 +147,15 @@ class Device {
     each<<<kBlocks, kThreads>>>(static_cast<int64_t>(times), count, f);
     check(cudaGetLastError());
   }
-  void sort(Array<uint32_t>& keys, Array<int32_t>& values) {
-    if (spare_keys_.size() != keys.size()) {
-      spare_keys_ = Array<uint32_t>(keys.size());
-      spare_values_ = Array<int32_t>(keys.size());
-    }
-    with_room([&](void* room, std::size_t& bytes) {
-      return cub::DeviceRadixSort::SortPairs(room, bytes, keys.data(), spare_keys_.data(), values.data(),
-                                             spare_values_.data(), static_cast<int>(keys.size()));
-    });
-    std::swap(keys, spare_keys_);
-    std::swap(values, spare_values_);
-  }
-  void scan(const Array<int32_t>& counts, Array<int32_t>& starts) {
-    check(cudaMemset(starts.data(), 0, sizeof(int32_t)));
-    with_room([&](void* room, std::size_t& bytes) {
-      return cub::DeviceScan::InclusiveSum(room, bytes, counts.data(), starts.data() + 1,
-                                           static_cast<int>(counts.size()));
-    });
-  }
-  template <class T>
-  void sums(const Array<T>& values, const Array<int32_t>& starts, Array<T>& out) {
-    with_room([&](void* room, std::size_t& bytes) {
-      return cub::DeviceSegmentedReduce::Sum(room, bytes, values.data(), out.data(),
-                                             static_cast<int>(starts.size() - 1), starts.data(), starts.data() + 1);
-    });
-  }
+  void sort(Array<uint32_t>& keys, Array<int32_t>& values);
+  void scan(const Array<int32_t>& counts, Array<int32_t>& starts);
+  void sums(const Array<float>& values, const Array<int32_t>& starts, Array<float>& out);
   void finish() { check(cudaDeviceSynchronize()); }
 
  private:
   static constexpr unsigned kThreads = 256;
   template <class F>
-  void with_room(F call) {
-    std::size_t bytes = 0;
-    check(call(nullptr, bytes));
-    if (room_.size() < bytes) room_ = Array<unsigned char>(bytes);
-    check(call(room_.data(), bytes));
-  }
+  void with_room(F call);
   Array<unsigned char> room_{1};
   Array<uint32_t> spare_keys_;  // [keys of the last sort]
   Array<int32_t> spare_values_;
