@@ -25,24 +25,24 @@ void Device::sort(Array<uint32_t>& keys, Array<int32_t>& values) {
   }
   with_room([&](void* room, std::size_t& bytes) {
     return cub::DeviceRadixSort::SortPairs(room, bytes, keys.data(), spare_keys_.data(), values.data(),
-                                           spare_values_.data(), static_cast<int>(keys.size()));
+                                           spare_values_.data(), static_cast<int>(keys.size()), 0, 32, stream_);
   });
   std::swap(keys, spare_keys_);
   std::swap(values, spare_values_);
 }
 
 void Device::scan(const Array<int32_t>& counts, Array<int32_t>& starts) {
-  check(cudaMemset(starts.data(), 0, sizeof(int32_t)));
+  check(cudaMemsetAsync(starts.data(), 0, sizeof(int32_t), stream_));
   with_room([&](void* room, std::size_t& bytes) {
-    return cub::DeviceScan::InclusiveSum(room, bytes, counts.data(), starts.data() + 1,
-                                         static_cast<int>(counts.size()));
+    return cub::DeviceScan::InclusiveSum(room, bytes, counts.data(), starts.data() + 1, static_cast<int>(counts.size()),
+                                         stream_);
   });
 }
 
 void Device::sums(const Array<float>& values, const Array<int32_t>& starts, Array<float>& out) {
   with_room([&](void* room, std::size_t& bytes) {
     return cub::DeviceSegmentedReduce::Sum(room, bytes, values.data(), out.data(), static_cast<int>(starts.size() - 1),
-                                           starts.data(), starts.data() + 1);
+                                           starts.data(), starts.data() + 1, stream_);
   });
 }
 

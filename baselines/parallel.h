@@ -8,6 +8,9 @@
 //   scan(counts, starts)  starts[i] = counts[0] + .. + counts[i - 1]; starts has one entry more
 //   sums(values, starts, out)  out[s] = values[starts[s]] + .. + values[starts[s + 1] - 1], in an order that depends on
 //                         that segment alone
+//   repeat(recording, f)  calls f, which only launches, over memory that stays where it is. A device records it the
+//   second
+//                         time, and then launches it as a whole; recording.forget() when memory or parameters change.
 // Sums, and so all results of a simulator without atomics, have the same bits in every run.
 #pragma once
 #include <algorithm>
@@ -73,6 +76,13 @@ class Host {
       out.data()[s] = std::accumulate(values.data() + starts.data()[s], values.data() + starts.data()[s + 1], 0.0f);
     }
   }
+  struct Recording {
+    void forget() {}
+  };
+  template <class F>
+  void repeat(Recording&, F f) {
+    f();
+  }
   void finish() {}
 };
 
@@ -133,29 +143,66 @@ class Device {
   };
 
   // Throws std::runtime_error where there is no device.
-  Device() { check(cudaFree(nullptr)); }
+  Device() { check(cudaStreamCreate(&stream_)); }
+  Device(const Device&) = delete;
+  Device& operator=(const Device&) = delete;
+  ~Device() { cudaStreamDestroy(stream_); }
 
   template <class F>
   void for_each(std::size_t n, F f) {
     if (n == 0) return;
-    each<<<static_cast<unsigned>((n + kThreads - 1) / kThreads), kThreads>>>(static_cast<int64_t>(n), f);
+    each<<<static_cast<unsigned>((n + kThreads - 1) / kThreads), kThreads, 0, stream_>>>(static_cast<int64_t>(n), f);
     check(cudaGetLastError());
   }
   template <class F>
   void for_each(std::size_t times, const int32_t* count, F f) {
     constexpr unsigned kBlocks = 2048;  // fill a device; threads go on in strides
-    each<<<kBlocks, kThreads>>>(static_cast<int64_t>(times), count, f);
+    each<<<kBlocks, kThreads, 0, stream_>>>(static_cast<int64_t>(times), count, f);
     check(cudaGetLastError());
   }
   void sort(Array<uint32_t>& keys, Array<int32_t>& values);
   void scan(const Array<int32_t>& counts, Array<int32_t>& starts);
   void sums(const Array<float>& values, const Array<int32_t>& starts, Array<float>& out);
-  void finish() { check(cudaDeviceSynchronize()); }
+  class Recording {
+   public:
+    Recording() = default;
+    Recording(const Recording&) = delete;
+    Recording& operator=(const Recording&) = delete;
+    ~Recording() { forget(); }
+    void forget() {
+      if (graph_ != nullptr) cudaGraphExecDestroy(graph_);
+      graph_ = nullptr, is_warm_ = false;
+    }
+
+   private:
+    friend class Device;
+    cudaGraphExec_t graph_ = nullptr;
+    bool is_warm_ = false;  // memory for temporary results is there
+  };
+  template <class F>
+  void repeat(Recording& recording, F f) {
+    if (!recording.is_warm_) {
+      recording.is_warm_ = true;
+      return f();
+    }
+    if (recording.graph_ == nullptr) {
+      cudaGraph_t graph;
+      check(cudaStreamBeginCapture(stream_, cudaStreamCaptureModeThreadLocal));
+      f();
+      check(cudaStreamEndCapture(stream_, &graph));
+      const cudaError_t error = cudaGraphInstantiate(&recording.graph_, graph, 0);
+      cudaGraphDestroy(graph);
+      check(error);
+    }
+    check(cudaGraphLaunch(recording.graph_, stream_));
+  }
+  void finish() { check(cudaStreamSynchronize(stream_)); }
 
  private:
-  static constexpr unsigned kThreads = 256;
+  static constexpr unsigned kThreads = 64;
   template <class F>
   void with_room(F call);
+  cudaStream_t stream_ = nullptr;
   Array<unsigned char> room_{1};
   Array<uint32_t> spare_keys_;  // [keys of the last sort]
   Array<int32_t> spare_values_;

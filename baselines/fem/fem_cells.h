@@ -121,7 +121,7 @@ BASELINES_HOST_DEVICE inline bool crosses_any(const float* patches, int64_t coun
 
 // --- Cells -----------------------------------------------------------------------------------------------------------
 
-// Cells around nodes: node i has slots[offsets[i]] .. slots[offsets[i + 1] - 1], each corner · cells + cell.
+// Cells around nodes: node i has slots[offsets[i]] .. slots[offsets[i + 1] - 1], each 8 · cell + corner.
 struct CellsAround {
   int64_t cells;
   const int32_t *offsets, *slots;
@@ -270,15 +270,20 @@ BASELINES_HOST_DEVICE inline void add_block(const View& s, int64_t c, const floa
   for (int k = 0; k < 9; ++k) block[k] += s.lambda / volumes[8] * along_a[k / 3] * along_b[k % 3];
 }
 
-// The sum at a node of what its cells' corners have: component k of [8 corners][width][c].
-BASELINES_HOST_DEVICE inline float sum_around(const CellsAround& around, int64_t i, const float* of_corners, int width,
-                                              int k) {
-  float sum = 0;
-  for (int32_t at = around.offsets[i]; at < around.offsets[i + 1]; ++at) {
-    const int64_t corner = around.slots[at] / around.cells, c = around.slots[at] % around.cells;
-    sum += of_corners[(corner * width + k) * around.cells + c];
+// sums[0 .. width - 1]: at a node, of what its cells' corners have in [8 corners][width][c]. Eight at once are read
+// before any is awaited.
+template <int width>
+BASELINES_HOST_DEVICE inline void sum_around(const CellsAround& around, int64_t i, const float* of_corners,
+                                             float* sums) {
+  for (int k = 0; k < width; ++k) sums[k] = 0;
+  const int32_t end = around.offsets[i + 1];
+  for (int32_t first = around.offsets[i]; first < end; first += 8) {
+    for (int32_t at = first; at < first + 8; ++at) {
+      if (at >= end) continue;
+      const int64_t c = around.slots[at] >> 3, corner = around.slots[at] & 7;
+      for (int k = 0; k < width; ++k) sums[k] += of_corners[(corner * width + k) * around.cells + c];
+    }
   }
-  return sum;
 }
 
 }  // namespace cutproof::baselines::fem

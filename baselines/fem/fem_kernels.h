@@ -195,12 +195,13 @@ class Kernels : public Simulator {
     const auto b = static_cast<float>(settings_.rayleigh);
     const auto decay = static_cast<float>(std::exp(-settings_.damping * dt));
     const float scale = dt * (dt + b);
-    if (grids_for_ != scale) {  // not yet made, or for another step
+    if (grids_for_ != scale && cells > 0) {  // not yet made, or for another step
       const double h = std::cbrt(volume_of(corners_of(mesh_.rest, mesh_.cells.front())));
       const double density = mesh_.cell_mass.front() / (h * h * h);
       multigrid_.make(mesh_, host_corners_, host_fixed_, scale * (2 * lame_.mu + lame_.lambda) / (density * h * h),
                       settings_.grids);
       grids_for_ = scale;
+      iteration_.forget();
     }
     float *const x = x_.data(), *const v = v_.data(), *const start = start_.data(), *const w = w_.data();
     float *const way = p_.data(), *const y = y_.data(), *const r = r_.data();
@@ -235,17 +236,18 @@ class Kernels : public Simulator {
       });
       executor_.for_each(nodes, [=] BASELINES_KERNEL(int64_t i) {
         float block[6];
-        for (int k = 0; k < 6; ++k) block[k] = scale * sum_around(s.around, i, blocks, 6, k);
+        sum_around<6>(s.around, i, blocks, block);
+        for (float& each : block) each *= scale;
         block[0] += s.mass[i], block[3] += s.mass[i], block[5] += s.mass[i];
         invert(block, inverse + 6 * i);
         for (int k = 0; k < 6; ++k) inverse[6 * i + k] *= damping;
         const float g[3] = {gx, gy, gz};
+        float force[3], product[3];
+        sum_around<3>(s.around, i, s.force, force);
+        sum_around<3>(s.around, i, s.product, product);
         for (int k = 0; k < 3; ++k) {
           const int64_t at = 3 * i + k;
-          r[at] = s.fixed[i] != 0
-                      ? 0
-                      : s.mass[i] * (dt * g[k] - (v[at] - start[at])) + dt * sum_around(s.around, i, s.force, 3, k) -
-                            sum_around(s.around, i, s.product, 3, k);
+          r[at] = s.fixed[i] != 0 ? 0 : s.mass[i] * (dt * g[k] - (v[at] - start[at])) + dt * force[k] - product[k];
         }
       });
       multigrid_.assemble(executor_, s, eighth_.data(), scale);
@@ -274,17 +276,13 @@ class Kernels : public Simulator {
 
   // Conjugate gradients for r, from delta = 0.
   void solve(float scale) {
-    const std::size_t nodes = place_.size(), cells = mesh_.cells.size(), components = starts_.size() - 1;
-    const View s = view();
-    float *const p = p_.data(), *const q = y_.data(), *const r = r_.data(), *const z = z_.data();
-    float *const delta = delta_.data(), *const dots = dots_.data();
-    float *const rz = rz_.data(), *const next = next_.data(), *const pq = pq_.data(), *const least = least_.data();
+    float *const p = p_.data(), *const z = z_.data(), *const rz = rz_.data(), *const least = least_.data();
     int32_t* const active = active_.data();
     const auto factor = static_cast<float>(settings_.tolerance * settings_.tolerance);
     precondition(scale);
     sum_up(rz_);
-    executor_.for_each(3 * nodes, [=] BASELINES_KERNEL(int64_t k) { p[k] = z[k]; });
-    executor_.for_each(components, [=] BASELINES_KERNEL(int64_t k) {
+    executor_.for_each(3 * place_.size(), [=] BASELINES_KERNEL(int64_t k) { p[k] = z[k]; });
+    executor_.for_each(starts_.size() - 1, [=] BASELINES_KERNEL(int64_t k) {
       least[k] = factor * rz[k];
       active[k] = rz[k] > least[k] ? 1 : 0;
     });
@@ -296,37 +294,49 @@ class Kernels : public Simulator {
         if (std::find(state.begin(), state.end(), 1) == state.end()) break;
       }
       ++iterations_;
-      executor_.for_each(cells, [=] BASELINES_KERNEL(int64_t c) {
-        if (active[s.component[s.corners[8 * c]]] != 0) apply_cell(s, c, p);
-      });
-      executor_.for_each(nodes, [=] BASELINES_KERNEL(int64_t i) {
-        for (int k = 0; k < 3; ++k) {
-          const int64_t at = 3 * i + k;
-          q[at] = s.fixed[i] != 0 ? 0 : s.mass[i] * p[at] + scale * sum_around(s.around, i, s.product, 3, k);
-        }
-        dots[i] = dot3(p + 3 * i, q + 3 * i);
-      });
-      sum_up(pq_);
-      executor_.for_each(nodes, [=] BASELINES_KERNEL(int64_t i) {
-        const int32_t k = s.component[i];
-        if (active[k] == 0 || !(pq[k] > 0)) return;
-        const float step = rz[k] / pq[k];
-        for (int64_t at = 3 * i; at < 3 * i + 3; ++at) delta[at] += step * p[at], r[at] -= step * q[at];
-      });
-      precondition(scale);
-      sum_up(next_);
-      executor_.for_each(nodes, [=] BASELINES_KERNEL(int64_t i) {
-        const int32_t k = s.component[i];
-        if (active[k] == 0) return;
-        const float share = next[k] / rz[k];
-        for (int64_t at = 3 * i; at < 3 * i + 3; ++at) p[at] = z[at] + share * p[at];
-      });
-      executor_.for_each(components, [=] BASELINES_KERNEL(int64_t k) {
-        if (active[k] == 0) return;
-        rz[k] = next[k];
-        active[k] = pq[k] > 0 && next[k] > least[k] ? 1 : 0;
-      });
+      executor_.repeat(iteration_, [&] { iterate(scale); });
     }
+  }
+
+  void iterate(float scale) {
+    const std::size_t nodes = place_.size();
+    const View s = view();
+    float *const p = p_.data(), *const q = y_.data(), *const r = r_.data(), *const z = z_.data();
+    float *const delta = delta_.data(), *const dots = dots_.data();
+    float *const rz = rz_.data(), *const next = next_.data(), *const pq = pq_.data(), *const least = least_.data();
+    int32_t* const active = active_.data();
+    executor_.for_each(mesh_.cells.size(), [=] BASELINES_KERNEL(int64_t c) {
+      if (active[s.component[s.corners[8 * c]]] != 0) apply_cell(s, c, p);
+    });
+    executor_.for_each(nodes, [=] BASELINES_KERNEL(int64_t i) {
+      float product[3];
+      sum_around<3>(s.around, i, s.product, product);
+      for (int k = 0; k < 3; ++k) {
+        const int64_t at = 3 * i + k;
+        q[at] = s.fixed[i] != 0 ? 0 : s.mass[i] * p[at] + scale * product[k];
+      }
+      dots[i] = dot3(p + 3 * i, q + 3 * i);
+    });
+    sum_up(pq_);
+    executor_.for_each(nodes, [=] BASELINES_KERNEL(int64_t i) {
+      const int32_t k = s.component[i];
+      if (active[k] == 0 || !(pq[k] > 0)) return;
+      const float step = rz[k] / pq[k];
+      for (int64_t at = 3 * i; at < 3 * i + 3; ++at) delta[at] += step * p[at], r[at] -= step * q[at];
+    });
+    precondition(scale);
+    sum_up(next_);
+    executor_.for_each(nodes, [=] BASELINES_KERNEL(int64_t i) {
+      const int32_t k = s.component[i];
+      if (active[k] == 0) return;
+      const float share = next[k] / rz[k];
+      for (int64_t at = 3 * i; at < 3 * i + 3; ++at) p[at] = z[at] + share * p[at];
+    });
+    executor_.for_each(starts_.size() - 1, [=] BASELINES_KERNEL(int64_t k) {
+      if (active[k] == 0) return;
+      rz[k] = next[k];
+      active[k] = pq[k] > 0 && next[k] > least[k] ? 1 : 0;
+    });
   }
 
  private:
@@ -403,8 +413,7 @@ class Kernels : public Simulator {
     }
     const auto each_corner = [&](const auto& see) {
       for (std::size_t k = 0; k < corners.size(); ++k) {
-        if (mesh_.is_removed[k / 8] == 0)
-          see(static_cast<std::size_t>(corners[k]), static_cast<int32_t>(k % 8 * cells + k / 8));
+        if (mesh_.is_removed[k / 8] == 0) see(static_cast<std::size_t>(corners[k]), static_cast<int32_t>(k));
       }
     };
     each_corner([&](std::size_t i, int32_t) { ++offsets[i + 1]; });
@@ -418,6 +427,7 @@ class Kernels : public Simulator {
     fixed_ = Array<uint8_t>(fixed), component_ = Array<int32_t>(component), starts_ = Array<int32_t>(starts);
     chunk_starts_ = Array<int32_t>(chunk_starts), chunks_ = Array<float>(chunk_starts.size() - 1);
     host_corners_ = corners, host_fixed_ = fixed, grids_for_ = 0;
+    iteration_.forget();
     corners_ = Array<int32_t>(corners), shape_ = Array<int32_t>(shape_of_cell_), links_ = Array<int32_t>(links);
     offsets_ = Array<int32_t>(offsets), slots_ = Array<int32_t>(slots);
     for (Array<float>* const each : {&start_, &w_, &p_, &y_, &r_, &z_, &delta_}) *each = Array<float>(3 * nodes);
@@ -439,6 +449,7 @@ class Kernels : public Simulator {
   std::vector<int32_t> host_corners_;  // [8 c]
   std::vector<uint8_t> host_fixed_;    // [p]
   Multigrid<Executor> multigrid_;
+  typename Executor::Recording iteration_;
   std::vector<int32_t> shape_of_cell_;
   std::vector<std::size_t> place_;  // of a particle among nodes in the order of components
   Executor executor_;

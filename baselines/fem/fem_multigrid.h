@@ -22,24 +22,19 @@ BASELINES_HOST_DEVICE inline float weight_in_box(int octant, int corner, int of_
   return weight;
 }
 
-// A coarse cell has its blocks A_ab, a <= b, as entries [36 pairs][9][c].
-BASELINES_HOST_DEVICE inline int pair_of(int a, int b) { return a * (15 - a) / 2 + b; }
-// out = Σ_b A_ab u_b for corner a of a cell, `u` [8][3].
+// A coarse cell has its blocks A_ab as entries [8 a][8 b][9][c]. out = Σ_b A_ab u_b for corner a, `u` [8][3].
 BASELINES_HOST_DEVICE inline void apply_row(const float* entries, int64_t cells, int64_t c, int a, const float* u,
                                             float* out) {
   out[0] = out[1] = out[2] = 0;
   for (int b = 0; b < 8; ++b) {
-    const bool is_upper = a <= b;
-    const float* const block = entries + 9 * int64_t{is_upper ? pair_of(a, b) : pair_of(b, a)} * cells + c;
-    for (int k = 0; k < 9; ++k)
-      out[is_upper ? k / 3 : k % 3] += block[k * cells] * u[3 * b + (is_upper ? k % 3 : k / 3)];
+    const float* const block = entries + 9 * int64_t{8 * a + b} * cells + c;
+    for (int k = 0; k < 9; ++k) out[k / 3] += block[k * cells] * u[3 * b + k % 3];
   }
 }
 // block = A_aa, xx xy xz yy yz zz.
 BASELINES_HOST_DEVICE inline void diagonal_block(const float* entries, int64_t cells, int64_t c, int a, float* block) {
   for (int row = 0, k = 0; row < 3; ++row) {
-    for (int column = row; column < 3; ++column)
-      block[k++] = entries[(9 * int64_t{pair_of(a, a)} + 3 * row + column) * cells + c];
+    for (int column = row; column < 3; ++column) block[k++] = entries[(81 * int64_t{a} + 3 * row + column) * cells + c];
   }
 }
 // The greatest eigenvalue of D⁻¹A of a cell, D its diagonal blocks, by the power method from below. Σ λ_c D_c over all
@@ -81,10 +76,12 @@ struct Level {
 };
 // b − A x at a node, from the cells' products of x.
 BASELINES_HOST_DEVICE inline void residual_at(const Level& level, int64_t i, float* r) {
+  float sums[3];
+  sum_around<3>(level.around, i, level.product, sums);
   for (int k = 0; k < 3; ++k) {
     const int64_t at = 3 * i + k;
     const float own = level.mass == nullptr ? 0 : level.mass[i] * level.x[at];
-    r[k] = level.b[at] - own - level.scale * sum_around(level.around, i, level.product, 3, k);
+    r[k] = level.b[at] - own - level.scale * sums[k];
     if (level.fixed != nullptr && level.fixed[i] != 0) r[k] = 0;
   }
 }
@@ -116,6 +113,7 @@ class Multigrid {
   void make(const Mesh& mesh, const std::vector<int32_t>& corners, const std::vector<uint8_t>& fixed, double stiffness,
             int most) {
     grids_.clear();
+    has_bounds_ = false;
     Grid finer = finest(mesh, corners, fixed.size());
     std::vector<uint8_t> is_removed = mesh.is_removed;
     for (int level = 0; level < most && stiffness > kLeastStiffness; ++level, stiffness /= 4) {
@@ -128,7 +126,7 @@ class Multigrid {
     }
   }
   std::size_t levels() const { return grids_.size(); }
-  std::vector<float> entries(std::size_t level) const { return grids_[level].entries.copy(); }  // [36 pairs][9][c]
+  std::vector<float> entries(std::size_t level) const { return grids_[level].entries.copy(); }  // [8][8][9][c]
 
   // Coarse operators and diagonals, from the rotations and twists of `s`. `eighth` [c] kg: a cell's mass at a corner.
   void assemble(Executor& executor, const View& s, const float* eighth, float scale) {
@@ -142,10 +140,10 @@ class Multigrid {
       const int64_t finer = level == 0 ? s.cells : grids_[level - 1].cells;
       executor.for_each(static_cast<std::size_t>(36 * cells), [=] BASELINES_KERNEL(int64_t t) {
         const int64_t c = t % cells;
-        const auto pair = static_cast<int>(t / cells);
-        int a = 0;
-        while (pair_of(a, 7) < pair) ++a;
-        const int b = pair - pair_of(a, 0);
+        const auto pair = static_cast<int>(t / cells);  // b >= a: 00 01 .. 07 11 12 ..
+        int a = 0, before = 0;
+        while (before + 8 - a <= pair) before += 8 - a++;
+        const int b = a + pair - before;
         float block[9] = {};
         for (int32_t k = begin[c]; k < begin[c + 1]; ++k) {
           const int64_t child = children[k];
@@ -166,32 +164,36 @@ class Multigrid {
             for (int q = 0; q < 8; ++q) {
               const float weight = wa[p] * wb[q];
               if (weight == 0) continue;
-              const bool is_upper = p <= q;
-              const float* const from =
-                  of_children + 9 * int64_t{is_upper ? pair_of(p, q) : pair_of(q, p)} * finer + child;
-              for (int e = 0; e < 9; ++e) block[e] += weight * from[(is_upper ? e : 3 * (e % 3) + e / 3) * finer];
+              const float* const from = of_children + 9 * int64_t{8 * p + q} * finer + child;
+              for (int e = 0; e < 9; ++e) block[e] += weight * from[e * finer];
             }
           }
         }
-        for (int e = 0; e < 9; ++e) entries[(9 * int64_t{pair} + e) * cells + c] = block[e];
+        for (int e = 0; e < 9; ++e) {
+          entries[(9 * int64_t{8 * a + b} + e) * cells + c] = block[e];
+          if (a != b) entries[(9 * int64_t{8 * b + a} + 3 * (e % 3) + e / 3) * cells + c] = block[e];
+        }
       });
       float* const bound = grid.bounds.data();
-      executor.for_each(static_cast<std::size_t>(cells),
-                        [=] BASELINES_KERNEL(int64_t c) { bound[c] = greatest_eigenvalue(entries, cells, c); });
+      if (!has_bounds_) {
+        executor.for_each(static_cast<std::size_t>(cells),
+                          [=] BASELINES_KERNEL(int64_t c) { bound[c] = greatest_eigenvalue(entries, cells, c); });
+      }
       const CellsAround around = grid.around();
       float* const inverse = grid.inverse.data();
       executor.for_each(static_cast<std::size_t>(grid.nodes), [=] BASELINES_KERNEL(int64_t i) {
         float block[6] = {};
         for (int32_t at = around.offsets[i]; at < around.offsets[i + 1]; ++at) {
-          const int64_t corner = around.slots[at] / cells, c = around.slots[at] % cells;
+          const int64_t c = around.slots[at] >> 3;
           float own[6];
-          diagonal_block(entries, cells, c, static_cast<int>(corner), own);
+          diagonal_block(entries, cells, c, around.slots[at] & 7, own);
           for (int k = 0; k < 6; ++k) block[k] += bound[c] * own[k];
         }
         invert(block, inverse + 6 * i);
         for (int k = 0; k < 6; ++k) inverse[6 * i + k] *= kDamping;
       });
     }
+    has_bounds_ = true;
   }
 
   // finest.x = an approximation of A⁻¹ finest.b; linear, symmetric and positive definite.
@@ -280,7 +282,7 @@ class Multigrid {
     Array<int32_t> corners, offsets, slots;           // [8 c]; cells around nodes
     Array<int32_t> child_offsets, children, octants;  // of each cell its finer cells, and of these their octants
     Matrix prolongation, restriction;                 // P and Pᵀ, to and from the finer grid
-    Array<float> entries, product, bounds, inverse;   // [36][9][c]; [8][3][c]; [c] λ; [p][6]
+    Array<float> entries, product, bounds, inverse;   // [8][8][9][c]; [8][3][c]; [c] λ; [p][6]
     Array<float> x, b, r;                             // [p][3]
     CellsAround around() const { return {cells, offsets.data(), slots.data()}; }
     Level level() {
@@ -318,14 +320,14 @@ class Multigrid {
     }
     for (std::size_t k = 0; k < 8 * cells; ++k) {
       corners.push_back(grid.corners[k / 8][k % 8]);
-      at_node.push_back({corners.back(), static_cast<int32_t>(k % 8 * cells + k / 8), 1});
+      at_node.push_back({corners.back(), static_cast<int32_t>(k), 1});
     }
     made.corners = Array<int32_t>(corners), made.octants = Array<int32_t>(octants);
     Matrix of_cells = matrix_of(cells, children), around = matrix_of(grid.nodes, at_node);
     made.child_offsets = std::move(of_cells.offsets), made.children = std::move(of_cells.columns);
     made.offsets = std::move(around.offsets), made.slots = std::move(around.columns);
     made.prolongation = matrix_of(finer.nodes, up), made.restriction = matrix_of(grid.nodes, down);
-    made.entries = Array<float>(36 * 9 * cells), made.product = Array<float>(24 * cells);
+    made.entries = Array<float>(576 * cells), made.product = Array<float>(24 * cells);
     made.bounds = Array<float>(cells), made.inverse = Array<float>(6 * grid.nodes);
     for (Array<float>* const each : {&made.x, &made.b, &made.r}) *each = Array<float>(3 * grid.nodes);
     return made;
@@ -334,6 +336,7 @@ class Multigrid {
   // Below this the finest grid alone is well conditioned.
   static constexpr double kLeastStiffness = 2;
   std::vector<OnDevice> grids_;  // the first has boxes of two cells a side
+  bool has_bounds_ = false;      // of the cells' eigenvalues, which hardly change with the deformation
 };
 
 }  // namespace cutproof::baselines::fem
