@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -530,7 +531,7 @@ class RunJudge::Implementation {
   // Sums over all that exists: momentum, its centre, its angular momentum about that.
   void momenta(const RunFrame& frame) {
     if (frame.velocities.empty() || velocity_was_.empty() || !frame.time || !time_was_) return;
-    if (std::ssize(mass_) < n_ || exists_.size() != existed_.size() || exists_ != existed_) {
+    if (std::min(std::ssize(mass_), std::ssize(mass_was_)) < n_ || exists_ != existed_) {
       found_[kMomentum].why = found_[kCentre].why = "mass is not given of all, or particles come and go in every frame";
       return;
     }
@@ -541,7 +542,7 @@ class RunJudge::Implementation {
     if (is_held && !frame.contact_impulse) return;
     const double dt = *frame.time - *time_was_, dt_s = dt / static_cast<double>(header_.steps);
     const Vec3 gravity = header_.gravity.value_or(Vec3{}), impulse = frame.contact_impulse.value_or(Vec3{});
-    long double mass_sum = 0;
+    long double mass_sum = 0, mass_was_sum = 0;
     double squares = 0, farthest = 0;
     WideSum p_sum, p_was_sum, x_sum, x_was_sum;
     for (std::size_t i = 0; i < exists_.size(); ++i) {
@@ -549,17 +550,21 @@ class RunJudge::Implementation {
     }
     for (std::size_t i = 0; i < exists_.size(); ++i) {
       if (exists_[i] == 0) continue;
-      const double m = mass_[i];
+      // A cut may move mass from one particle to another; the frame before had the masses of then.
+      const double m = mass_[i], m_was = mass_was_[i];
       mass_sum += m;
+      mass_was_sum += m_was;
       p_sum += m * frame.velocities[i];
-      p_was_sum += m * velocity_was_[i];
+      p_was_sum += m_was * velocity_was_[i];
       x_sum += m * frame.positions[i];
-      x_was_sum += m * was_[i];
-      const double rounds = norm(frame.velocities[i]) + norm(velocity_was_[i]) + kStableForces * farthest / dt_s;
-      squares += m * rounds * m * rounds;
+      x_was_sum += m_was * was_[i];
+      const double rounds =
+          std::max(m, m_was) * (norm(frame.velocities[i]) + norm(velocity_was_[i]) + kStableForces * farthest / dt_s);
+      squares += rounds * rounds;
     }
-    const Vec3 p = p_sum, p_was = p_was_sum, x = x_sum, x_was = x_was_sum;
-    const auto mass = static_cast<double>(mass_sum);
+    const Vec3 p = p_sum, p_was = p_was_sum;
+    const auto mass = static_cast<double>(mass_sum), mass_was = static_cast<double>(mass_was_sum);
+    const Vec3 x = Vec3(x_sum) / mass, x_was = Vec3(x_was_sum) / mass_was, v = p / mass, v_was = p_was / mass_was;
     const double steps = static_cast<double>(header_.steps), decay = header_.damping * dt;
     // One rounding of a group, as of a cluster's translation, moves all its particles alike. Equal coordinates round
     // alike, as those of a grid that moves without turning.
@@ -582,14 +587,13 @@ class RunJudge::Implementation {
            off, frame_, off / mass);
     if (norm(impulse) == 0 && !is_held && (is_free || frame.blade.empty())) {
       // The mean velocity of the frame lies between those of its ends; half a substep of gravity either way.
-      const Vec3 middle = 0.5 * (p + p_was);
-      const double way = norm((x - x_was) - dt * middle) / mass;
-      const double between = dt * (0.5 * norm(p - p_was) + lag(dt) * std::max(norm(p), norm(p_was))) / mass;
-      const double places =
-          header_.u * (kDeviations * std::sqrt(steps) * farthest + 4 * *frame.time * norm(middle) / mass);
+      const Vec3 middle = 0.5 * (v + v_was);
+      const double way = norm((x - x_was) - dt * middle);
+      const double between = dt * (0.5 * norm(v - v_was) + lag(dt) * std::max(norm(v), norm(v_was)));
+      const double places = header_.u * (kDeviations * std::sqrt(steps) * farthest + 4 * *frame.time * norm(middle));
       if (!within(kCentre, way, between + places + dt * rounding / mass))
         fail(kCentre, {}, "the centre of mass is {:.3g} m from where its velocity takes it in frame {}", way, frame_);
-      angular(frame, x / mass, x_was / mass, p / mass, p_was / mass, rounding, farthest);
+      angular(frame, x, x_was, v, v_was, rounding, farthest);
     }
   }
 
@@ -601,7 +605,7 @@ class RunJudge::Implementation {
       const double m = mass_[i];
       const Vec3 arm = frame.positions[i] - x, was = was_[i] - x_was;
       spins_sum += m * cross(arm, frame.velocities[i] - v);
-      spins_was_sum += m * cross(was, velocity_was_[i] - v_was);
+      spins_was_sum += mass_was_[i] * cross(was, velocity_was_[i] - v_was);
       if (!frame.spin.empty()) spins_sum += frame.spin[i];
       if (!spin_was_.empty()) spins_was_sum += spin_was_[i];
       size += m * norm(arm) * norm(frame.velocities[i] - v);
@@ -625,15 +629,15 @@ class RunJudge::Implementation {
   // Vertices that are split share the mass of the one that they come from.
   void masses() {
     if (!is_new_mass_ || std::ssize(mass_) != n_) return;
-    long double sum = 0;
-    for (const double m : mass_) sum += m;
-    const auto mass = static_cast<double>(sum);
-    if (mass_was_) {
-      const double off = std::abs(mass - *mass_was_);
-      if (!within(kMass, off, kDeviations * header_.u * std::sqrt(static_cast<double>(n_)) * *mass_was_))
-        fail(kMass, {}, "there are {:.6g} kg in frame {}, and there were {:.6g}", mass, frame_, *mass_was_);
+    if (!mass_was_.empty()) {
+      const auto sum = [](const std::vector<double>& masses) {
+        return static_cast<double>(std::accumulate(masses.begin(), masses.end(), 0.0L));
+      };
+      const double mass = sum(mass_), was = sum(mass_was_);
+      if (!within(kMass, std::abs(mass - was), kDeviations * header_.u * std::sqrt(static_cast<double>(n_)) * was))
+        fail(kMass, {}, "there are {:.6g} kg in frame {}, and there were {:.6g}", mass, frame_, was);
     }
-    mass_was_ = mass;
+    mass_was_ = mass_;
   }
 
   void energy(const RunFrame& frame) {
@@ -874,8 +878,7 @@ class RunJudge::Implementation {
   }
 
   const RunHeader header_;
-  std::vector<double> mass_;
-  std::optional<double> mass_was_;
+  std::vector<double> mass_, mass_was_;  // [n] of this frame, and of the last one of which it was given
   std::vector<Found> found_;
   std::vector<std::string> notes_;
   RunCoupling coupling_;

@@ -272,6 +272,33 @@ void see(RunJudge& judge, int f, double dt, std::span<const Vec3> x, std::span<c
   judge.see(frame);
 }
 
+// One particle meets another in frame 2 and leaves it half of its mass, with its momentum, or without: the frame before
+// had other masses.
+TEST(RunJudge, WeighsEachFrameWithItsOwnMasses) {
+  constexpr double kDt = 0.25;
+  for (const double taken : {1.0 / 3, 0.0}) {
+    RunHeader header;
+    header.promises = 1u << static_cast<int>(RunPromise::free) | 1u << static_cast<int>(RunPromise::angular_momentum);
+    RunJudge judge(header);
+    judge.weigh({1, 1});
+    Vec3 x[] = {{-2 * kDt, 0, 0}, {0, 0, 0}}, v[] = {{1, 0, 0}, {0, 0, 0}};
+    for (int f = 0; f < 5; ++f) {
+      if (f == 2) {
+        judge.weigh({0.5, 1.5});
+        v[1].x = taken;
+      }
+      see(judge, f, kDt, x, v);
+      for (int k = 0; k < 2; ++k) x[k] += kDt * v[k];
+    }
+    judge.finish();
+    for (const Verdict& verdict : judge.verdicts()) {
+      const bool is_momentum = verdict.property == "linear momentum";
+      EXPECT_EQ(verdict.holds, taken > 0 || !is_momentum) << verdict.property << ": " << verdict.witness.text;
+      EXPECT_EQ(is_momentum ? verdict.checked : 4, 4);
+    }
+  }
+}
+
 // A step of semi-implicit or implicit damping is off the exponential by the square of c dt.
 TEST(RunJudge, AllowsWhatSchemesOfDampingDiffer) {
   const double dt = 0.01, c = 20;
