@@ -181,9 +181,10 @@ Arrays mirrored_answers(const Scene& scene, Arrays answers) {
 
 Verdict judge_mirrored(const Question& question, const std::vector<io::ArrayFile>& run, const Apart& apart,
                        Precision precision, const AskBeside& ask) {
-  // Which way a decision falls that rounding makes is no matter of the mirror.
-  if (apart.pieces.perhaps_cut > 0 || apart.pieces.beside > 0)
-    return not_judged(kMirrored, "the blade lies within rounding of tissue");
+  // Which way a decision falls that rounding makes is no matter of the mirror: neither where tissue is cut, nor in
+  // which frame, where one sweep ends on an edge and the next goes on there.
+  if (apart.pieces.ever_perhaps_cut > 0 || apart.pieces.beside > 0)
+    return not_judged(kMirrored, "in some frame it is open which tissue the blade cuts");
   const Scene scene = scene_of(question.given);
   const std::optional<Arrays> answers = ask(with_scene(question, mirrored_scene(scene), precision));
   if (!answers) return unreadable(kMirrored, "it does not answer the mirrored scene");

@@ -254,6 +254,7 @@ void SweptTissue::cut(Edge& edge, std::span<const Vec3> quads, std::span<const V
     edge.near.clear();
   } else if (edge.state == Edge::State::perhaps && was_whole) {
     ++perhaps_;
+    ++ever_perhaps_;
   }
 }
 

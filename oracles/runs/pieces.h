@@ -43,6 +43,8 @@ class SweptTissue {
   bool is_beside(int32_t unit) const { return beside_[static_cast<std::size_t>(unit)] != 0; }
   int64_t surely_cut() const { return surely_; }
   int64_t perhaps_cut() const { return perhaps_; }
+  // Of these and of edges that are surely cut by now: how many were perhaps cut in some frame.
+  int64_t ever_perhaps_cut() const { return ever_perhaps_; }
 
  private:
   // A border of a quad: where a sweep ends, unless another one goes on there.
@@ -60,7 +62,7 @@ class SweptTissue {
   std::vector<Edge> edges_;
   std::vector<uint8_t> gone_, beside_;
   std::vector<Vec3> last_;  // quads of the sweep before
-  int64_t surely_ = 0, perhaps_ = 0;
+  int64_t surely_ = 0, perhaps_ = 0, ever_perhaps_ = 0;
 };
 
 }  // namespace cutproof::oracles

@@ -243,6 +243,7 @@ class RunJudge::Implementation {
     std::sort(made.sizes.rbegin(), made.sizes.rend());
     made.surely_cut = tissue_->surely_cut();
     made.perhaps_cut = tissue_->perhaps_cut();
+    made.ever_perhaps_cut = tissue_->ever_perhaps_cut();
     for (int32_t k = 0; k < made.units; ++k) made.beside += tissue_->is_beside(k);
     made.coupled = coupled_count_;
     made.last_cut = last_cut_;

@@ -17,6 +17,7 @@ struct RunPieces {
   int64_t pieces = 0, at_most = 0;                      // that surely are, and that may be
   std::vector<int64_t> sizes;                           // of the sure ones, descending
   int64_t surely_cut = 0, perhaps_cut = 0, beside = 0;  // edges of tissue; units that may be on either side
+  int64_t ever_perhaps_cut = 0;                         // edges of which it was open in a frame whether they are cut
   int64_t coupled = 0;                                  // components of the coupling
   int64_t last_cut = -1;                                // the last frame that surely parted tissue; -1: none
 };

@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -239,6 +241,60 @@ TEST(Dissect, AMirroredRunThatCannotBeReadFails) {
     EXPECT_FALSE(verdicts().at(0).holds);
   }
   EXPECT_GT(judged, 3);
+}
+
+// A bar of 5 × 2 × 2 that flies along itself and breathes across. The blade splits it lengthwise in two frames; the
+// first sweep ends so many spacings from the bar's end.
+Question split_bar(double speed, double first_end, const PluginInfo& plugin) {
+  scenes::Scene scene;
+  scene.h = 0x1p-7;
+  scene.nodes = {5, 2, 2};
+  scene.frames = 5;
+  scene.frame_time = 0x1p-7;
+  scene.blades = 1;
+  for (int32_t i = 0; i < 20; ++i) {
+    const std::array<int32_t, 3> node = {i % 5, i / 5 % 2, i / 10};
+    scene.node.insert(scene.node.end(), node.begin(), node.end());
+    scene.rest.push_back(scene.h * Vec3{double(node[0]), double(node[1]), double(node[2])});
+    scene.velocity.push_back({speed, 2 * (scene.rest.back().y - 0.5 * scene.h), 0});
+    if (node[0] < 4) scene.edges.push_back({i, i + 1});
+    if (node[1] < 1) scene.edges.push_back({i, i + 5});
+    if (node[2] < 1) scene.edges.push_back({i, i + 10});
+  }
+  scene.mass.assign(20, 1e-4);
+  scene.held.assign(20, 0);
+  scene.kick.assign(20, {});
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  scene.blade.assign(at(4 * scene.frames), {nan, nan, nan});
+  for (int f = 1; f <= 2; ++f) {
+    const double from = f == 1 ? -1.5 : first_end - 0.5, to = f == 1 ? first_end : 5.5;
+    for (int c = 0; c < 4; ++c) {
+      const Vec3 corner = scene.h * Vec3{c < 2 ? from : to, 0.4, c == 0 || c == 3 ? 2.5 : -1.5};
+      scene.blade[at(4 * f + c)] = corner + Vec3{f * scene.frame_time * speed, 0, 0};
+    }
+  }
+  scenes::add_cells(scene);
+  return scenes::question_of(scene, "cut through", plugin);
+}
+
+// Rounding decides in which frame an edge is cut on which a sweep ends, and the mirrored run rounds differently.
+TEST(Dissect, AMirrorAsksNothingThatRoundingDecides) {
+  PluginInfo plugin = with_limits("");
+  plugin.promises = "mirror";
+  Guest guest({PLUGIN_springs, "right", 20});
+  const AskBeside beside = [&](const Question& next) -> std::optional<Arrays> {
+    return ask(guest, dissect(), next, true).arrays;
+  };
+  for (int k = 1; k <= 4; ++k) {
+    for (const double first_end : {1.0, 1.4}) {
+      const Question question = split_bar(0.1 * k, first_end, plugin);
+      const Arrays answers = ask(guest, dissect(), question, true).arrays;
+      const std::vector<Verdict> verdicts = dissect().judge_beside(question, answers, Precision::binary64, beside);
+      ASSERT_EQ(verdicts.size(), 1U);
+      EXPECT_TRUE(verdicts[0].holds) << k << ": " << verdicts[0].witness.text;
+      EXPECT_EQ(verdicts[0].checked > 0, first_end > 1) << k;
+    }
+  }
 }
 
 TEST(Dissect, WhereNearlyEverythingIsRefusedNothingIsKnown) {

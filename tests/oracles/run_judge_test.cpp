@@ -62,9 +62,9 @@ struct Bar {
     }
   }
   // A third of the section in each frame, from below; it turns and falls with the bar.
-  void sweep(int f) {
+  void sweep(int f, double higher = 0) {
     const Vec3 middle = 0.5 * (x[at(f)][2] + x[at(f)][3]), side = x[at(f)][2 + 6] - x[at(f)][2];
-    const double low = (f - 3) * 0.15 - 0.25, high = low + 0.15;
+    const double low = (f - 3) * 0.15 - 0.25 + higher, high = low + 0.15;
     const Vec3 up = {0, 0, 1}, across = side / norm(side);
     blade[at(f)] = {middle - 0.1 * across + low * up, middle + 0.3 * across + low * up,
                     middle + 0.3 * across + high * up, middle - 0.1 * across + high * up};
@@ -126,6 +126,23 @@ TEST(RunJudge, HoldsOfABarThatIsPartedByItsBlade) {
   EXPECT_EQ(bar.pieces.coupled, 2);
   EXPECT_EQ(bar.pieces.last_cut, 5);
   for (int k = 0; k < 24; ++k) EXPECT_EQ(bar.piece_of.at(at(k)), k % 6 >= 3 ? 3 : 0);
+}
+
+// Rounding decides whether a sweep cuts what it ends on, or the next one, which goes on there.
+TEST(RunJudge, KnowsEdgesThatTwoFramesMayCut) {
+  for (const double higher : {0.0, 0.05}) {  // frame 4 ends at 0.05 m, or on the upper two edges, at 0.1 m
+    Bar still;
+    still.header.gravity = Vec3{};
+    for (int f = 0; f < Bar::kFrames; ++f) {
+      still.x[at(f)] = still.header.rest;
+      still.v[at(f)].assign(24, Vec3{});
+      if (f >= 3 && f <= 5) still.sweep(f, higher);
+    }
+    EXPECT_EQ(failing(still), "");
+    EXPECT_EQ(still.pieces.surely_cut, 4);
+    EXPECT_EQ(still.pieces.perhaps_cut, 0);
+    EXPECT_EQ(still.pieces.ever_perhaps_cut, higher > 0 ? 2 : 0);
+  }
 }
 
 TEST(RunJudge, HoldsOfABarThatIsWhollyRemoved) {
