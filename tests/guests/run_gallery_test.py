@@ -150,6 +150,13 @@ class RightSimulators(unittest.TestCase):
             self.assertEqual(felt, 0)
             self.assertGreater(moved, 1e-3)
 
+    def test_a_point_among_held_ones_does_not_creep(self):
+        body = scene.block(size=(5, 5, 5))
+        held = (body["nodes"] != 2).any(1)
+        body.update(held=held, velocities=np.where(held[:, None], 0, body["velocities"]))
+        run = simulated("material_points", body, np.full((FRAMES, 1, 4, 3), np.nan))
+        np.testing.assert_array_equal(run[-1]["positions"], body["rest"])
+
     def test_they_are_short(self):
         for name in PROGRAMS:
             right, own = lines_of((GALLERY / f"{name}.py").read_text())

@@ -56,8 +56,9 @@ def simulate(body, blade, frames, fault=None):
             order = slice(None) if fault != "race" else np.random.default_rng().permutation(len(node))
             heavy = np.bincount(node[order], weights[order])[:, None]
             fast = np.stack([np.bincount(node[order], parts[order, axis]) for axis in range(3)], 1)
+            clamped = np.bincount(node, weights * held.repeat(27))[:, None] > 0.17 * heavy  # or held points only drag
             least = 0 if fault != "momentum_from_nothing" else mass.mean() / 10  # light nodes are skipped
-            fast = np.where(heavy > least, fast / np.where(heavy > 0, heavy, 1) + dt * body["gravity"], 0)
+            fast = np.where((heavy > least) & ~clamped, fast / np.where(heavy > 0, heavy, 1) + dt * body["gravity"], 0)
             fast = weight[:, :, None] * fast[node].reshape(n, 27, 3)
             v, affine = np.where(held[:, None], 0, fast.sum(1)), 4 / cell**2 * np.swapaxes(fast, 1, 2) @ way
             if fault == "spin_lost":  # an outer product the wrong way round
