@@ -1,8 +1,8 @@
 """The simulators of guests/examples/runs/, asked by `dissect`: right ones hold in drawn scenes, and each fault fails the
 property that is named here. CUTPROOF names the program.
 
-Usage: dissect_test.py            right simulators in 50 scenes, or 1,000 (ci/nightly.sh), and what a function may do
-                                  wrong
+Usage: dissect_test.py            what a function may do wrong
+       dissect_test.py right      right simulators in 50 scenes, or 1,000 (ci/nightly.sh)
        dissect_test.py SIMULATOR  every fault of this one is found in few scenes, and shrunk
 """
 import importlib
@@ -82,7 +82,6 @@ class RightSimulators(Dissected):
                 self.assertGreater(judged["mirrored run"], cases // 20)
                 for kind in operation["kinds"]:
                     self.assertGreater(kind["as_drawn"], 0, kind)
-
 
     def test_a_kick_is_asked_of_who_repeats_itself(self):
         function = scene.dissection(PROGRAMS["springs"].simulate, "global_solver")
@@ -186,4 +185,4 @@ class Faults(Dissected):
 if __name__ == "__main__":
     print(f"seed {SEED}", file=sys.stderr)
     unittest.main(argv=sys.argv[:1], verbosity=2,
-                  defaultTest=["Faults"] if sys.argv[1:] else ["RightSimulators", "Functions"])
+                  defaultTest={"": "Functions", "right": "RightSimulators"}.get("".join(sys.argv[1:]), "Faults"))

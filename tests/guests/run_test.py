@@ -2,6 +2,7 @@
 shows fails the property that is named here, each that two runs show a relation.
 
 Usage: run_test.py           right simulators, and what a run may look like
+       run_test.py Related   right simulators keep every relation
        run_test.py Faults    every fault fails what is named here
 The environment names the program (CUTPROOF).
 """
@@ -123,18 +124,6 @@ class Runs(Simulated):
                     for wanted in (ACROSS, WITHIN, "linear momentum", "centre of mass", "angular momentum"):
                         self.assertIn(wanted, [verdict["property"] for verdict in document["verdicts"]])
 
-    def test_right_simulators_keep_every_relation(self):
-        for simulator in SIMULATORS:
-            others = ("same", "reset", "rotate:90z") if simulator == "springs" else ()
-            for word in ("units:4,4,16", "mirror:x", *others):
-                with self.subTest(simulator=simulator, map=word):
-                    keeps_bits = word in ("same", "reset", "units:4,4,16")
-                    status, document, text = self.related(simulator, word, bits=keeps_bits)
-                    self.assertEqual(status, 0, text)
-                    self.assertIn("related coupling", [verdict["property"] for verdict in document["verdicts"]])
-        status, _, text = self.related("springs", "permute", noise=("1", "2"))
-        self.assertEqual(status, 0, text)
-
     def test_relations_of_arrays_in_memory(self):
         scene = {"rest": numpy.random.default_rng(1).random((6, 3)), "gravity": numpy.array([0, 0, -9.81]),
                  "velocities": numpy.ones((6, 3)), "mass": numpy.ones(6), "drag": numpy.array(0.5)}
@@ -210,29 +199,6 @@ class Runs(Simulated):
                                  ((both, dict(both, kicked=x)), "same", "Use cutproof kick")):
             with self.subTest(map=map, words=words), self.assertRaisesRegex(cutproof.Error, words):
                 cutproof.relate(*runs, map=map)
-
-    def test_finer_steps_converge(self):
-        runs = []
-        for steps in (10, 20, 40):
-            scene, finer = self.folder / "scene.npz", self.folder / "finer.npz"
-            self.simulate("springs", "plain.h5", "--frames", "4", "--save-scene", scene)
-            numpy.savez(finer, **{**numpy.load(scene), "steps": steps})
-            runs.append(self.simulate("springs", f"{steps}.h5", "--frames", "4", "--scene", finer))
-        status, document, text = self.relate(*runs, "--map", "refine")
-        self.assertEqual(status, 0, text)
-        self.assertGreater(document["differences"][0], 1.8 * document["differences"][1])
-        shorter = self.simulate("springs", "shorter.h5", "--frames", "3", "--scene", finer)
-        status, document, text = self.relate(*runs[:2], shorter, "--map", "refine")
-        self.assertEqual((status, self.failed(document)), (1, ["related frames"]), text)
-        for options, words in ((("--noise", shorter), "compares with no noise"), (("--bits",), "have other bits"),
-                               (("--dimension", "a=1,1,1"), "--make")):
-            done = subprocess.run([os.environ["CUTPROOF"], "relate", *runs, "--map", "refine", *options],
-                                  capture_output=True, text=True)
-            self.assertEqual(done.returncode, 2)
-            self.assertIn(words, " ".join(done.stderr.split()))
-        other = self.simulate("springs", "other.h5", "--frames", "4", "--scene", finer, "--fault", "spin_lost")
-        status, document, text = self.relate(*runs[:2], other, "--map", "refine")
-        self.assertEqual((status, self.failed(document)), (1, ["converges"]), text)
 
     def test_continuous_integration_reads_each_property_once(self):
         path, report = self.simulate("springs", "run.h5", "--fault", "heals"), self.folder / "junit.xml"
@@ -431,6 +397,43 @@ class Runs(Simulated):
         self.assertEqual((status, document["pieces"]["units"]), (0, 1), text)
         inverted = [v for v in document["verdicts"] if v["property"] == "no inverted cell"]
         self.assertEqual([v["checked"] for v in inverted], [3])
+
+
+class Related(Simulated):
+    def test_right_simulators_keep_every_relation(self):
+        for simulator in SIMULATORS:
+            others = ("same", "reset", "rotate:90z") if simulator == "springs" else ()
+            for word in ("units:4,4,16", "mirror:x", *others):
+                with self.subTest(simulator=simulator, map=word):
+                    keeps_bits = word in ("same", "reset", "units:4,4,16")
+                    status, document, text = self.related(simulator, word, bits=keeps_bits)
+                    self.assertEqual(status, 0, text)
+                    self.assertIn("related coupling", [verdict["property"] for verdict in document["verdicts"]])
+        status, _, text = self.related("springs", "permute", noise=("1", "2"))
+        self.assertEqual(status, 0, text)
+
+    def test_finer_steps_converge(self):
+        runs = []
+        for steps in (10, 20, 40):
+            scene, finer = self.folder / "scene.npz", self.folder / "finer.npz"
+            self.simulate("springs", "plain.h5", "--frames", "4", "--save-scene", scene)
+            numpy.savez(finer, **{**numpy.load(scene), "steps": steps})
+            runs.append(self.simulate("springs", f"{steps}.h5", "--frames", "4", "--scene", finer))
+        status, document, text = self.relate(*runs, "--map", "refine")
+        self.assertEqual(status, 0, text)
+        self.assertGreater(document["differences"][0], 1.8 * document["differences"][1])
+        shorter = self.simulate("springs", "shorter.h5", "--frames", "3", "--scene", finer)
+        status, document, text = self.relate(*runs[:2], shorter, "--map", "refine")
+        self.assertEqual((status, self.failed(document)), (1, ["related frames"]), text)
+        for options, words in ((("--noise", shorter), "compares with no noise"), (("--bits",), "have other bits"),
+                               (("--dimension", "a=1,1,1"), "--make")):
+            done = subprocess.run([os.environ["CUTPROOF"], "relate", *runs, "--map", "refine", *options],
+                                  capture_output=True, text=True)
+            self.assertEqual(done.returncode, 2)
+            self.assertIn(words, " ".join(done.stderr.split()))
+        other = self.simulate("springs", "other.h5", "--frames", "4", "--scene", finer, "--fault", "spin_lost")
+        status, document, text = self.relate(*runs[:2], other, "--map", "refine")
+        self.assertEqual((status, self.failed(document)), (1, ["converges"]), text)
 
 
 class Faults(Simulated):
