@@ -11,7 +11,7 @@ kit=${2:-gpu_kit}
 most_bytes=60000000  # most that can be sent to such a machine beside the code
 
 programs=(cli/cutproof cli/cutproof-guest tests/gpu/launch_device_test tests/gpu/device_failures_test tests/gpu/kernels_test
-  property_tests/property_tests tests/baselines/fem_test tests/baselines/mpm_test tests/baselines/tets_test)
+  property_tests/property_tests tests/baselines/baselines_test)
 [ -f "$build/CMakeCache.txt" ] || { echo "ci/gpu_kit.sh: $build is no build folder: cmake --preset default -B $build first" >&2; exit 2; }
 # Programs look beside themselves for their libraries and for those of the libraries. (A runpath, the linkers' default,
 # does not apply to the latter.)

@@ -94,13 +94,13 @@ for part in $parts; do
         done
       done ;;
     methods)
+      try baselines_test baselines_test
+      for tool in memcheck racecheck initcheck synccheck; do
+        try "baselines_$tool" compute-sanitizer --tool "$tool" --error-exitcode 9 baselines_test --gtest_filter='*cuda*'
+      done
       for method in fem mpm tets; do
-        try "${method}_test" "${method}_test"
         try "dissect_$method" cutproof judge "guests/${method}_cuda.so" dissect --cases "${CUTPROOF_SCENES:-1000}" \
           --time-limit 60 --save "$results"
-        for tool in memcheck racecheck initcheck synccheck; do
-          try "${method}_$tool" compute-sanitizer --tool "$tool" --error-exitcode 9 "${method}_test" --gtest_filter='*cuda*'
-        done
       done
       try methods cutproof bench baselines --backend gpu --sizes 12800,37704,48385,101096 --with guests/fem_cuda.so \
         --with guests/mpm_cuda.so --with guests/mpm_cuda.so,labels=0 --with guests/tets_cuda.so \

@@ -460,4 +460,6 @@ class Kernels : public Simulator {
   Array<float> rotation_, twist_, force_, product_, blocks_;
 };
 
+extern template class Kernels<Host>;
+
 }  // namespace cutproof::baselines::fem

@@ -200,7 +200,7 @@ def program(name):
 
 def fallbacks(mutant):
     if mutant.stage == "baseline":
-        return ["dissection_test"]
+        return ["baselines_test"]
     if mutant.stage == "judge":
         tests = [test for folder in TESTS_OF_JUDGES if folder in mutant.code for test in TESTS_OF_JUDGES[folder]]
         return [test for test in dict.fromkeys(tests) if test not in mutant.suspects]

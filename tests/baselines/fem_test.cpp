@@ -1112,13 +1112,13 @@ std::pair<int, std::string> judged(const char* plugin, const std::string& option
   return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, output};
 }
 TEST(FemPlugin, JudgeFindsNothingInDrawnScenes) {
-  for (const char* const plugin : {PLUGIN_CPU, PLUGIN_HOST}) {
+  for (const char* const plugin : {PLUGINS "/fem_cpu.so", PLUGINS "/fem_host.so"}) {
     const auto [status, output] = judged(plugin, "--cases 20 --seed 1");
     EXPECT_EQ(status, 0) << output;
   }
 }
 TEST(FemPlugin, SaysWhatIsWrongWithParameters) {
-  for (const char* const plugin : {PLUGIN_CPU, PLUGIN_HOST}) {
+  for (const char* const plugin : {PLUGINS "/fem_cpu.so", PLUGINS "/fem_host.so"}) {
     const auto [status, output] = judged(plugin, "--cases 10 --parameters steps=0");
     EXPECT_EQ(status, 2) << output;  // it cannot run
     EXPECT_NE(output.find("parameter 'steps' is 0; give a number from 1 to 1e+06"), std::string::npos) << output;

@@ -1012,7 +1012,7 @@ std::pair<int, std::string> judged(const std::string& arguments) {
 }
 
 TEST(MpmJudge, HoldsWithLabels) {
-  for (const char* const plugin : {PLUGIN_CPU, PLUGIN_HOST}) {
+  for (const char* const plugin : {PLUGINS "/mpm_cpu.so", PLUGINS "/mpm_host.so"}) {
     const auto [status, output] = judged("'" + std::string(plugin) + "' dissect --cases 20 --seed 1");
     EXPECT_EQ(status, 0) << output;
     EXPECT_NE(output.find("all hold"), std::string::npos) << output;
@@ -1020,13 +1020,13 @@ TEST(MpmJudge, HoldsWithLabels) {
 }
 
 TEST(MpmJudge, FindsThatThePublishedMethodHeals) {
-  const auto [status, output] = judged("'" PLUGIN_CPU "' dissect --cases 20 --seed 1 --shrink 0 --parameters labels=0");
+  const auto [status, output] = judged("'" PLUGINS "/mpm_cpu.so" "' dissect --cases 20 --seed 1 --shrink 0 --parameters labels=0");
   EXPECT_EQ(status, 1) << output;
   EXPECT_NE(output.find("no coupling across pieces"), std::string::npos) << output;
 }
 
 TEST(MpmJudge, SaysWhichParameterIsBad) {
-  const auto [status, output] = judged("'" PLUGIN_CPU "' dissect --cases 1 --parameters cell=0");
+  const auto [status, output] = judged("'" PLUGINS "/mpm_cpu.so" "' dissect --cases 1 --parameters cell=0");
   EXPECT_EQ(status, 2) << output;
   EXPECT_NE(output.find("'cell'"), std::string::npos) << output;
 }

@@ -845,7 +845,7 @@ TEST(TetsParameters, AreRefusedWithASentence) {
 TEST(TetsJudge, HoldsOverDrawnScenes) {
   const char* const other = std::getenv("CUTPROOF");
   const std::string program = other != nullptr ? other : CUTPROOF_PROGRAM;
-  for (const char* const plugin : {PLUGIN_CPU, PLUGIN_HOST}) {
+  for (const char* const plugin : {PLUGINS "/tets_cpu.so", PLUGINS "/tets_host.so"}) {
     const std::string save = testing::TempDir();
     const int status = std::system(("'" + program + "' judge '" + plugin + "' dissect --cases 20 --seed 1 --shrink 0" +
                                     " --save '" + save + "' --quiet")
