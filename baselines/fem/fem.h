@@ -63,7 +63,8 @@ struct Linearised {
 };
 Linearised linearise(const Element& element, Lame lame, const Corners& x, bool projected = true);
 
-// The greatest eigenvalue of D⁻¹K at rest, D the 3 × 3 diagonal blocks of K. It bounds that of any mesh of such cells.
+// The greatest eigenvalue of D⁻¹K of a cell at rest, D the 3 × 3 diagonal blocks of K. It bounds that of a mesh of such
+// cells.
 double greatest_of_jacobi(const Corners& rest, Lame lame);
 
 // Places of the mesh's nodes in equilibrium with `load` [p] N, from the places `x` [p] m; held nodes stay. Newton's

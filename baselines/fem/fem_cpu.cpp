@@ -1,6 +1,5 @@
 // The method in double precision, written to be read: the oracle of the kernels.
 #include <Eigen/CholmodSupport>
-#include <Eigen/Eigenvalues>
 #include <Eigen/IterativeLinearSolvers>
 #include <Eigen/SVD>
 #include <Eigen/Sparse>
@@ -185,11 +184,23 @@ Linearised linearise(const Element& element, Lame lame, const Corners& x, bool p
 
 double greatest_of_jacobi(const Corners& rest, Lame lame) {
   const Matrix24 stiffness = linearise(element_of(rest), lame, rest).stiffness;
-  Matrix24 diagonal = Matrix24::Zero();
-  for (int k = 0; k < 24; k += 3) diagonal.block<3, 3>(k, k) = stiffness.block<3, 3>(k, k);
-  return Eigen::GeneralizedSelfAdjointEigenSolver<Matrix24>(stiffness, diagonal, Eigen::EigenvaluesOnly)
-      .eigenvalues()
-      .maxCoeff();
+  // By the power method; from below, and close after so many rounds.
+  constexpr int kRounds = 100;
+  Vector24 v, w;
+  for (int k = 0; k < 24; ++k) v[k] = std::sin(1.0 + k);
+  double greatest = 0;
+  for (int round = 0; round < kRounds; ++round) {
+    const Vector24 product = stiffness * v;
+    double inertia = 0;
+    for (int k = 0; k < 24; k += 3) {
+      const Matrix3d block = stiffness.block<3, 3>(k, k);
+      w.segment<3>(k) = block.inverse() * product.segment<3>(k);
+      inertia += v.segment<3>(k).dot(block * v.segment<3>(k));
+    }
+    greatest = v.dot(product) / inertia;
+    v = w / w.norm();
+  }
+  return greatest;
 }
 
 double energy_of(const Mesh& mesh, Lame lame, const Vec3& gravity, const Frame& frame) {

@@ -178,6 +178,18 @@ TEST(FemElement, AtRestStiffnessIsThatOfLinearElasticity) {
   }
 }
 
+TEST(FemElement, TheBoundOfJacobiIsTheGreatestEigenvalue) {
+  Draw draw(19);
+  for (const double ratio : kRatios) {
+    const Corners rest = drawn_rest(draw);
+    const Matrix24 k = linearise(element_of(rest), lame_of(1e4, ratio), rest).stiffness;
+    Matrix24 diagonal = Matrix24::Zero();
+    for (int i = 0; i < 24; i += 3) diagonal.block<3, 3>(i, i) = k.block<3, 3>(i, i);
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix24> solver(k, diagonal, Eigen::EigenvaluesOnly);
+    EXPECT_NEAR(greatest_of_jacobi(rest, lame_of(1e4, ratio)) / solver.eigenvalues().maxCoeff(), 1, 1e-3) << ratio;
+  }
+}
+
 TEST(FemElement, LameParametersGiveTheModuli) {
   for (const double ratio : kRatios) {
     const Lame lame = lame_of(5000, ratio);
