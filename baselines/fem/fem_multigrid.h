@@ -119,7 +119,7 @@ class Multigrid {
     for (int level = 0; level < most && stiffness > kLeastStiffness; ++level, stiffness /= 4) {
       std::vector<int32_t> parent;
       const Grid grid = coarser(finer, parent);
-      if (2 * grid.place.size() > finer.place.size()) break;  // fragments alone
+      if (grid.place.size() == finer.place.size()) break;  // nothing is joined any more
       grids_.push_back(on_device(finer, grid, parent, is_removed, level == 0 ? fixed : std::vector<uint8_t>()));
       is_removed.clear();
       finer = grid;
