@@ -276,11 +276,13 @@ JudgedRelation judge_relation(const oracles::RunMap& map, const RelatedFiles& fi
   return judge_related(map, first, others, noise, files.bits, frame_done);
 }
 
-JudgedRelation judge_relation(const oracles::RunMap& map, io::RunSegments first, io::RunSegments second) {
+JudgedRelation judge_relation(const oracles::RunMap& map, io::RunSegments first, io::RunSegments second,
+                              std::vector<io::RunSegments> noise) {
   OpenRun one("the first run", std::move(first));
-  std::vector<std::unique_ptr<OpenRun>> others;
+  std::vector<std::unique_ptr<OpenRun>> others, disturbed;
   others.push_back(std::make_unique<OpenRun>("the second run", std::move(second)));
-  return judge_related(map, one, others, {}, false, {});
+  for (io::RunSegments& run : noise) disturbed.push_back(std::make_unique<OpenRun>("a disturbed run", std::move(run)));
+  return judge_related(map, one, others, disturbed, false, {});
 }
 
 }  // namespace cutproof::harness

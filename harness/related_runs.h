@@ -32,7 +32,8 @@ struct JudgedRelation {
 // Throws InputError if a file cannot be read, or lacks an array that a map needs.
 JudgedRelation judge_relation(const oracles::RunMap& map, const RelatedFiles& files,
                               const std::function<void(int64_t frame)>& frame_done = {});
-// Relates two runs in memory, by any map but `split` and `refine`.
-JudgedRelation judge_relation(const oracles::RunMap& map, io::RunSegments first, io::RunSegments second);
+// Relates two runs in memory, by any map but `split` and `refine`. `noise`: runs of the first that were disturbed.
+JudgedRelation judge_relation(const oracles::RunMap& map, io::RunSegments first, io::RunSegments second,
+                              std::vector<io::RunSegments> noise = {});
 
 }  // namespace cutproof::harness

@@ -245,9 +245,9 @@ TEST(Dissect, AMirroredRunThatCannotBeReadFails) {
 
 // A bar of 5 × 2 × 2 that flies along itself and breathes across. The blade splits it lengthwise in two frames; the
 // first sweep ends so many spacings from the bar's end.
-Question split_bar(double speed, double first_end, const PluginInfo& plugin) {
+Question split_bar(double speed, double first_end, const PluginInfo& plugin, double spacing = 0x1p-7) {
   scenes::Scene scene;
-  scene.h = 0x1p-7;
+  scene.h = spacing;
   scene.nodes = {5, 2, 2};
   scene.frames = 5;
   scene.frame_time = 0x1p-7;
@@ -294,6 +294,35 @@ TEST(Dissect, AMirrorAsksNothingThatRoundingDecides) {
       EXPECT_TRUE(verdicts[0].holds) << k << ": " << verdicts[0].witness.text;
       EXPECT_EQ(verdicts[0].checked > 0, first_end > 1) << k;
     }
+  }
+}
+
+// As a contact does, the simulator amplifies what rounds: the mirrored run rounds otherwise, and so do disturbed ones.
+TEST(Dissect, AMirrorAllowsForRoundingThatTheSimulatorAmplifies) {
+  PluginInfo plugin = with_limits("");
+  plugin.promises = "mirror";
+  Guest guest({PLUGIN_springs, "right", 20});
+  double handed = 0;  // [m] by which every place is to one side, also in the mirror
+  const AskBeside ask_it = [&](const Question& next) -> std::optional<Arrays> {
+    Arrays answers = ask(guest, dissect(), next, true).arrays;
+    const std::vector<Vec3> rest = scenes::vectors_of(given(next, "rest"));
+    Array& places = *std::ranges::find(answers, "run/position", &Array::name);
+    std::vector<Vec3> moved = scenes::vectors_of(places);
+    for (std::size_t k = rest.size(); k < moved.size(); ++k) {
+      const double x = rest[k % rest.size()].x;
+      moved[k].x += handed + 1e5 * ((x + 1) - 1 - x);
+    }
+    places = make_array(places.name, places.shape, scenes::numbers_of(moved));
+    return answers;
+  };
+  const Question question = split_bar(0.1, 1.4, plugin, 0.0123);
+  for (const double by : {0.0, 1e-8}) {
+    handed = by;
+    const Arrays answers = *ask_it(question);
+    const std::vector<Verdict> verdicts = dissect().judge_beside(question, answers, Precision::binary64, ask_it);
+    ASSERT_EQ(verdicts.size(), 1U);
+    EXPECT_GT(verdicts[0].checked, 0);
+    EXPECT_EQ(verdicts[0].holds, by == 0) << verdicts[0].witness.text;
   }
 }
 
