@@ -17,7 +17,7 @@ werror=()
 # Without a GPU kernels are compiled for one architecture only, as fast as possible.
 kernels=(-UCMAKE_CUDA_ARCHITECTURES)
 if [ "${CUTPROOF_WHOLE:-}" != 1 ]; then
-  export CUTPROOF_CASES=${CUTPROOF_CASES:-250}
+  export CUTPROOF_CASES=${CUTPROOF_CASES:-200}
   if [ ! -e /dev/nvidiactl ]; then
     kernels=(-DCMAKE_CUDA_ARCHITECTURES=90a-real)
     ! nvcc --help 2>/dev/null | grep -q -- --Ofast-compile || kernels+=("-DCMAKE_CUDA_FLAGS=--Ofast-compile=max")
