@@ -1019,18 +1019,16 @@ TEST(MpmJudge, HoldsWithLabels) {
   }
 }
 
+const std::string kCpu = "'" PLUGINS "/mpm_cpu.so'";
+
 TEST(MpmJudge, FindsThatThePublishedMethodHeals) {
-  const auto [status, output] = judged("'" PLUGINS
-                                       "/mpm_cpu.so"
-                                       "' dissect --cases 20 --seed 1 --shrink 0 --parameters labels=0");
+  const auto [status, output] = judged(kCpu + " dissect --cases 20 --seed 1 --shrink 0 --parameters labels=0");
   EXPECT_EQ(status, 1) << output;
   EXPECT_NE(output.find("no coupling across pieces"), std::string::npos) << output;
 }
 
 TEST(MpmJudge, SaysWhichParameterIsBad) {
-  const auto [status, output] = judged("'" PLUGINS
-                                       "/mpm_cpu.so"
-                                       "' dissect --cases 1 --parameters cell=0");
+  const auto [status, output] = judged(kCpu + " dissect --cases 1 --parameters cell=0");
   EXPECT_EQ(status, 2) << output;
   EXPECT_NE(output.find("'cell'"), std::string::npos) << output;
 }
