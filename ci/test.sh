@@ -14,6 +14,8 @@ docs=()
 ci/install.sh tests browser "${docs[@]}"
 werror=()
 [ "${CI:-}" = true ] && werror=(-DCUTPROOF_WERROR=ON)
+# What a compiler writes of dependencies tells ccache what a file includes, without preprocessing it once more.
+export CCACHE_DEPEND=1
 # Without a GPU kernels are compiled for one architecture only, as fast as possible.
 kernels=(-UCMAKE_CUDA_ARCHITECTURES)
 if [ "${CUTPROOF_WHOLE:-}" != 1 ]; then
