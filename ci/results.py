@@ -478,6 +478,18 @@ def methods(read):
                   "lost", "spin", "paper, ms"], rows)
 
 
+def methods_on_cores(read):
+    rows = []
+    for row in read("cpu_methods_host")["methods"]:
+        name, settings = row["name"].removesuffix("_host"), row["settings"].removesuffix(",remove=both")
+        if settings.startswith("iterations") and name != "this method":
+            continue
+        settings = settings.replace("iterations=", "K = ")
+        rows.append([name + (f", {settings}" if settings else ""), milliseconds(row["frame"]),
+                     figure(row["seconds_per_second"]), percent(row["error"]["rms"], 1), row["pieces"]["coupled"]])
+    return table(["method", "frame, ms", "s/s", "error", "bodies"], rows)
+
+
 def mutants_alone(read):
     alone = read("mutation_testing")["alone"]
     rows = [[stage, *(f"{found}/{asked}" for found, asked in counts)] for stage, counts in alone["stages"].items()]
@@ -485,7 +497,7 @@ def mutants_alone(read):
 
 
 TABLES = {of.__name__: of for of in (status, table_1, fig_10, sizes, errors, single_steps, solver, rotations, retardation, front, cut_faces,
-                                     geometry, baselines, sensitivity, methods, claims, isolation, cuda_plugins, mutants_by_finder,
+                                     geometry, baselines, sensitivity, methods, methods_on_cores, claims, isolation, cuda_plugins, mutants_by_finder,
                                      mutants_alone)}
 # Documents that only pictures use: docs/images/make.
 OF_PICTURES = {"h200_front_kidney_arc", "h200_front_small_block", "h200_front_cuboid_press", "h200_front_liver_cut"}
