@@ -1,4 +1,4 @@
-// Of the executor on a device, what CUB does; it takes long to compile.
+// Operations of Device that call CUB. It compiles slowly, so no simulator includes it.
 #include <cub/device/device_radix_sort.cuh>
 #include <cub/device/device_scan.cuh>
 #include <cub/device/device_segmented_reduce.cuh>

@@ -19,7 +19,7 @@ cmake -B "$build" -DCMAKE_BUILD_RPATH='$ORIGIN/../lib' -DCMAKE_EXE_LINKER_FLAGS=
 grep -q '^CMAKE_CUDA_COMPILER:.*nvcc' "$build/CMakeCache.txt" ||
   { echo "ci/gpu_kit.sh: $build has no gpu backend: it needs a CUDA toolkit" >&2; exit 2; }
 guests=(cuda_components cuda_components_in_a_block cuda_components_without_barrier cuda_rotations)
-methods=(fem_cuda mpm_cuda tets_cuda fem_cpu)
+methods=(fem_cuda mpm_cuda tets_cuda)
 cmake --build "$build" --target "${programs[@]##*/}" "${guests[@]}" "${methods[@]}"
 
 rm -rf "$kit.new"

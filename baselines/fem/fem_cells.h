@@ -1,5 +1,5 @@
-// Of kernels: what they do with a cell, in single precision. Each of its eight Gauss points has a polar decomposition
-// of its own.
+// What kernels do with one cell, in single precision. Each of its eight Gauss points has a polar decomposition of its
+// own.
 #pragma once
 #include <cmath>
 
