@@ -73,11 +73,15 @@ BASELINES_HOST_DEVICE inline Rotation rotation_of(const float* f) {
   return result;
 }
 
-// The inverse of a symmetric matrix xx xy xz yy yz zz; zero where it is not positive.
-BASELINES_HOST_DEVICE inline void invert(const float* a, float* inverse) {
+// The inverse of a symmetric matrix xx xy xz yy yz zz; zero where it is not positive. Scaled, so that the determinant
+// of small cells' masses and stiffnesses does not underflow.
+BASELINES_HOST_DEVICE inline void invert(const float* matrix, float* inverse) {
+  const float unit = matrix[0] + matrix[3] + matrix[5];
+  float a[6];
+  for (int k = 0; k < 6; ++k) a[k] = unit > 0 ? matrix[k] / unit : 0;
   const float xx = a[3] * a[5] - a[4] * a[4], xy = a[2] * a[4] - a[1] * a[5], xz = a[1] * a[4] - a[2] * a[3];
   const float determinant = a[0] * xx + a[1] * xy + a[2] * xz;
-  const float scale = determinant > 0 ? 1 / determinant : 0;
+  const float scale = determinant > 0 ? 1 / (determinant * unit) : 0;
   inverse[0] = scale * xx, inverse[1] = scale * xy, inverse[2] = scale * xz;
   inverse[3] = scale * (a[0] * a[5] - a[2] * a[2]), inverse[4] = scale * (a[1] * a[2] - a[0] * a[4]);
   inverse[5] = scale * (a[0] * a[3] - a[1] * a[1]);

@@ -284,18 +284,27 @@ class Kernels : public Simulator {
     executor_.for_each(3 * place_.size(), [=] BASELINES_KERNEL(int64_t k) { p[k] = z[k]; });
     executor_.for_each(starts_.size() - 1, [=] BASELINES_KERNEL(int64_t k) {
       least[k] = factor * rz[k];
-      active[k] = rz[k] > least[k] ? 1 : 0;
+      active[k] = state_of(rz[k], least[k]);
     });
     for (int iteration = 0; iteration < settings_.iterations; ++iteration) {
       // Components end by themselves; how often that is looked up changes nothing.
       constexpr int kBetweenLooks = 2;
-      if (iteration % kBetweenLooks == 0) {
-        const std::vector<int32_t> state = active_.copy();
-        if (std::find(state.begin(), state.end(), 1) == state.end()) break;
-      }
+      if (iteration % kBetweenLooks == 0 && !goes_on()) return;
       ++iterations_;
       executor_.repeat(iteration_, [&] { iterate(scale); });
     }
+    goes_on();
+  }
+
+  // Of a component: 1 while it iterates, 0 where it has converged, -1 where r · z shows that rounding has made an
+  // operator indefinite.
+  static BASELINES_HOST_DEVICE int32_t state_of(float rz, float least) { return rz < 0 ? -1 : rz > least ? 1 : 0; }
+  bool goes_on() const {
+    const std::vector<int32_t> state = active_.copy();
+    if (std::find(state.begin(), state.end(), -1) != state.end())
+      throw std::runtime_error(
+          "single precision does not solve the system of equations; take more steps, or a lower modulus");
+    return std::find(state.begin(), state.end(), 1) != state.end();
   }
 
   void iterate(float scale) {
@@ -306,7 +315,7 @@ class Kernels : public Simulator {
     float *const rz = rz_.data(), *const next = next_.data(), *const pq = pq_.data(), *const least = least_.data();
     int32_t* const active = active_.data();
     executor_.for_each(mesh_.cells.size(), [=] BASELINES_KERNEL(int64_t c) {
-      if (active[s.component[s.corners[8 * c]]] != 0) apply_cell(s, c, p);
+      if (active[s.component[s.corners[8 * c]]] > 0) apply_cell(s, c, p);
     });
     executor_.for_each(nodes, [=] BASELINES_KERNEL(int64_t i) {
       float product[3];
@@ -320,7 +329,7 @@ class Kernels : public Simulator {
     sum_up(pq_);
     executor_.for_each(nodes, [=] BASELINES_KERNEL(int64_t i) {
       const int32_t k = s.component[i];
-      if (active[k] == 0 || !(pq[k] > 0)) return;
+      if (active[k] <= 0 || !(pq[k] > 0)) return;
       const float step = rz[k] / pq[k];
       for (int64_t at = 3 * i; at < 3 * i + 3; ++at) delta[at] += step * p[at], r[at] -= step * q[at];
     });
@@ -328,14 +337,14 @@ class Kernels : public Simulator {
     sum_up(next_);
     executor_.for_each(nodes, [=] BASELINES_KERNEL(int64_t i) {
       const int32_t k = s.component[i];
-      if (active[k] == 0) return;
+      if (active[k] <= 0) return;
       const float share = next[k] / rz[k];
       for (int64_t at = 3 * i; at < 3 * i + 3; ++at) p[at] = z[at] + share * p[at];
     });
     executor_.for_each(starts_.size() - 1, [=] BASELINES_KERNEL(int64_t k) {
-      if (active[k] == 0) return;
+      if (active[k] <= 0) return;
       rz[k] = next[k];
-      active[k] = pq[k] > 0 && next[k] > least[k] ? 1 : 0;
+      active[k] = pq[k] > 0 ? state_of(next[k], least[k]) : pq[k] < 0 ? -1 : 0;
     });
   }
 
