@@ -285,7 +285,7 @@ struct Program : Simulator {
     heads = Array<int32_t>(n);
     numbers = Array<int32_t>(n + 1);
     first = Array<int32_t>(n + 1);
-    boxes = Array<Box>(n / kChunk + 2);
+    boxes = Array<Box>(n + n / 31 + 8);
     is_fine = Array<int32_t>(std::vector<int32_t>(1, 1));
     neighbour = Array<int32_t>(125 * n);
     slot = Array<int32_t>(27 * n);
@@ -407,43 +407,44 @@ struct Program : Simulator {
 
   struct Box {
     int low[3], high[3], is_fine;
+    BASELINES_HOST_DEVICE void join(const Box& other) {
+      for (int a = 0; a < 3; ++a) {
+        low[a] = other.low[a] < low[a] ? other.low[a] : low[a];
+        high[a] = other.high[a] > high[a] ? other.high[a] : high[a];
+      }
+      is_fine &= other.is_fine;
+    }
   };
-  static constexpr int kChunk = 256;
 
   void sort_points() {
     const V3* const at = x.data();
-    Box* const box = boxes.data();
     const auto dx = static_cast<float>(settings.cell);
     const auto count = static_cast<int64_t>(n);
-    // The box of all cells: of each chunk of points, then of all of these.
-    const int64_t chunks = (count + kChunk - 1) / kChunk;
-    executor.for_each(static_cast<std::size_t>(chunks), [=] BASELINES_KERNEL(int64_t c) {
-      Box sum = {{2000000, 2000000, 2000000}, {-2000000, -2000000, -2000000}, 1};
-      for (int64_t i = c * kChunk; i < (c + 1) * kChunk && i < count; ++i) {
-        const Place place = place_in_grid(at[i], dx);
-        for (int a = 0; a < 3; ++a) {
-          sum.low[a] = place.base[a] < sum.low[a] ? place.base[a] : sum.low[a];
-          sum.high[a] = place.base[a] > sum.high[a] ? place.base[a] : sum.high[a];
-        }
-        if (!place.is_fine) sum.is_fine = 0;
-      }
-      box[c + 1] = sum;
+    Box* box = boxes.data();
+    executor.for_each(n, [=] BASELINES_KERNEL(int64_t i) {
+      const Place place = place_in_grid(at[i], dx);
+      for (int a = 0; a < 3; ++a) box[i].low[a] = box[i].high[a] = place.base[a];
+      box[i].is_fine = place.is_fine ? 1 : 0;
     });
+    constexpr int64_t kChunk = 32;
+    for (int64_t left = count; left > 1;) {
+      const Box* const from = box;
+      const int64_t chunks = (left + kChunk - 1) / kChunk;
+      Box* const to = box += left;
+      executor.for_each(static_cast<std::size_t>(chunks), [=] BASELINES_KERNEL(int64_t c) {
+        Box sum = from[c * kChunk];
+        for (int64_t k = c * kChunk + 1; k < (c + 1) * kChunk && k < left; ++k) sum.join(from[k]);
+        to[c] = sum;
+      });
+      left = chunks;
+    }
+    whole_box = box;
     const int64_t labels = label_count;
     int32_t* const all_fine = is_fine.data();
     executor.for_each(1, [=] BASELINES_KERNEL(int64_t) {
-      Box sum = box[1];
-      for (int64_t c = 2; c <= chunks; ++c) {
-        for (int a = 0; a < 3; ++a) {
-          sum.low[a] = box[c].low[a] < sum.low[a] ? box[c].low[a] : sum.low[a];
-          sum.high[a] = box[c].high[a] > sum.high[a] ? box[c].high[a] : sum.high[a];
-        }
-        sum.is_fine &= box[c].is_fine;
-      }
       double all = static_cast<double>(labels);
-      for (int a = 0; a < 3; ++a) all *= sum.high[a] - sum.low[a] + 1;
-      if (!(all < 4294967295.0 && sum.is_fine != 0)) all_fine[0] = 0;
-      box[0] = sum;
+      for (int a = 0; a < 3; ++a) all *= box->high[a] - box->low[a] + 1;
+      if (!(all < 4294967295.0 && box->is_fine != 0)) all_fine[0] = 0;
     });
     uint32_t* const key = keys.data();
     int32_t* const who = order.data();
@@ -451,7 +452,7 @@ struct Program : Simulator {
     executor.for_each(n, [=] BASELINES_KERNEL(int64_t i) {
       const Place place = place_in_grid(at[i], dx);
       who[i] = static_cast<int32_t>(i);
-      key[i] = key_of(box[0], of[i], place.base[0], place.base[1], place.base[2]);
+      key[i] = key_of(*box, of[i], place.base[0], place.base[1], place.base[2]);
     });
     executor.sort(keys, order);
     const uint32_t* const sorted = keys.data();
@@ -477,7 +478,7 @@ struct Program : Simulator {
 
   void find_nodes(const Plates& plates) {
     const V3* const at = x.data();
-    const Box* const box = boxes.data();
+    const Box* const box = whole_box;
     const int32_t *const who = order.data(), *const begin = first.data(), *const of = label.data();
     const uint32_t* const key = keys.data();
     const auto dx = static_cast<float>(settings.cell);
@@ -737,7 +738,8 @@ struct Program : Simulator {
   Array<uint32_t> keys;                  // [n] cells, ascending
   Array<int32_t> order;                  // [n] points in the order of their cells
   Array<int32_t> heads, numbers, first;  // first of a cell; cells before; by cell its first in `order`
-  Array<Box> boxes;                      // of all cells, then of chunks of points
+  Array<Box> boxes;                      // of the points' cells, of 32 of them, of 1,024 and so on
+  const Box* whole_box = nullptr;        // the last of them
   Array<int32_t> is_fine;                // 1 until points are no longer finite, or too far apart for keys
   Array<int32_t> neighbour;              // [cells x 125] cells around a cell, or -1
   Array<int32_t> slot;                   // [cells x 27] where the data of a cell's node are
