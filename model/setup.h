@@ -18,11 +18,16 @@ enum class RemovedEnds { both, one, nearer };                // of an edge that 
 enum class MergeRule { none, deterministic, published };     // method.md §6
 enum class ExpandRule { none, edge_cover, published };       // method.md §7
 
+// A cluster has volume to keep if det A0 exceeds this part of (tr A0)³, A0 its second moments at rest. Otherwise it
+// extends along the axes whose moments exceed this part of the greatest (method.md §3, Volume).
+inline constexpr double kFlatVolume = 1.0 / (15 * 15 * 15), kFlatExtent = 1e-3;
+
 struct StepParameters {
   Solver solver = Solver::implicit;
   int32_t substeps = 4;                            // per frame, >= 1
   int32_t iterations = 4;                          // K per substep, >= 0
   double stiffness = 1e5;                          // k [1/s²], implicit: s = k dt² / (1 + k dt²)
+  double volume_share = 0;                         // β in [0, 1), implicit only: the share of k that keeps volume
   double relaxation = 0.5;                         // s in (0, 1], published
   Acceleration acceleration = Acceleration::none;  // implicit only
   double damping = 0;                              // c [1/s]: v = exp(-c dt) (x - x_prev) / dt

@@ -46,8 +46,8 @@ inline void know_every_member(const Setup& setup) {
   [[maybe_unused]] const auto& [name, grid, node, particle_at, rest, edge_offsets, edge_ends, mass, surface_crossing,
                                 origin, orientation] = body;
   [[maybe_unused]] const auto& [nodes, spacing] = grid;
-  [[maybe_unused]] const auto& [solver, substeps, iterations, stiffness, relaxation, acceleration, damping, retardation,
-                                gravity] = step;
+  [[maybe_unused]] const auto& [solver, substeps, iterations, stiffness, volume_share, relaxation, acceleration,
+                                damping, retardation, gravity] = step;
   [[maybe_unused]] const auto& [criterion, remove, epsilon, strain, without_blade] = detect;
   [[maybe_unused]] const auto& [debris] = split;
   [[maybe_unused]] const auto& [merge_rule] = merge;
@@ -90,6 +90,7 @@ constexpr void for_each_setup_field(Visit&& visit) {
   CUTPROOF_FIELD(step.substeps, "step", "substeps", one, "1", 1);
   CUTPROOF_FIELD(step.iterations, "step", "iterations", one, "1", 0);
   CUTPROOF_FIELD(step.stiffness, "step", "stiffness", one, "1/s²");
+  CUTPROOF_FIELD(step.volume_share, "step", "volume_share", one, "1", 0);
   CUTPROOF_FIELD(step.relaxation, "step", "relaxation", one);
   CUTPROOF_FIELD(step.acceleration, "step", "acceleration", one);
   CUTPROOF_FIELD(step.damping, "step", "damping", one, "1/s");

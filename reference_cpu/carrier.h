@@ -27,6 +27,31 @@ inline std::vector<Vec3> current_centers(const Body& body, const State& state, c
   return centers;
 }
 
+// The linear map of each cluster's goals: R_c of the state, and V_c of its positions.
+inline std::vector<Mat3> current_maps(const Setup& setup, const State& state, const Memberships& memberships,
+                                      const std::vector<Vec3>& centers) {
+  std::vector<Mat3> maps = state.clusters.rotation;
+  if (setup.step.volume_share == 0) return maps;
+  for (int32_t c = 0; c < state.clusters.count(); ++c) {
+    Mat3 a, a0;
+    a.m.fill(0);
+    a0.m.fill(0);
+    for (const int32_t i : state.clusters.of(c)) {
+      const double weight = setup.body.mass[at(i)] / static_cast<double>(memberships.count(i));
+      const Vec3 now = state.x[at(i)] - centers[at(c)];
+      const Vec3 rest = setup.body.rest_position(i) - state.clusters.rest_center[at(c)];
+      for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column) {
+          a(row, column) += weight * now[row] * rest[column];
+          a0(row, column) += weight * rest[row] * rest[column];
+        }
+      }
+    }
+    maps[at(c)] = goal_map(setup.step.volume_share, a, a0, maps[at(c)]);
+  }
+  return maps;
+}
+
 // Carries points of a particle's grid edges, or the particle itself (reach 0), as its clusters do.
 class Carrier {
  public:
@@ -34,7 +59,8 @@ class Carrier {
       : body_(setup.body),
         state_(state),
         memberships_(memberships_of(state.clusters, setup.body.particle_count())),
-        centers_(current_centers(setup.body, state, memberships_)) {}
+        centers_(current_centers(setup.body, state, memberships_)),
+        maps_(current_maps(setup, state, memberships_, centers_)) {}
 
   Vec3 operator()(int32_t owner, int direction = 0, double reach = 0) const {
     const double far = reach * body_.grid.spacing;
@@ -44,7 +70,7 @@ class Carrier {
     Vec3 sum;
     for (const int32_t cluster : memberships_.of(owner)) {
       const std::size_t c = at(cluster);
-      sum += centers_[c] + state_.clusters.rotation[c] * (rest - state_.clusters.rest_center[c]);
+      sum += centers_[c] + maps_[c] * (rest - state_.clusters.rest_center[c]);
     }
     // An owner without a cluster breaks I2. Its points then move with it, unrotated.
     const auto count = memberships_.count(owner);
@@ -56,6 +82,7 @@ class Carrier {
   const State& state_;
   Memberships memberships_;
   std::vector<Vec3> centers_;
+  std::vector<Mat3> maps_;
 };
 
 }  // namespace cutproof::reference

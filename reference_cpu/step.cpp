@@ -10,10 +10,10 @@ namespace cutproof::reference {
 
 namespace {
 
-// t_c and R_c of one cluster at positions x.
+// t_c and the goals' linear map of one cluster at positions x.
 struct Pose {
   Vec3 center;
-  Mat3 rotation;
+  Mat3 map;
 };
 
 // For each particle: its displacement by a grip in the substep, or that no grip holds it.
@@ -80,8 +80,8 @@ class Ahead {
 };
 
 // t_c = Σ w x / M, A = Σ w (x - t)(X - T)ᵀ, R_c = argmax tr(Rᵀ A).
-std::vector<Pose> match_shapes(const Body& body, const Memberships& memberships, const std::vector<Vec3>& x,
-                               Clusters& clusters) {
+std::vector<Pose> match_shapes(const Body& body, double volume_share, const Memberships& memberships,
+                               const std::vector<Vec3>& x, Clusters& clusters) {
   std::vector<Pose> poses(at(clusters.count()));
   for (int32_t c = 0; c < clusters.count(); ++c) {
     Pose& pose = poses[at(c)];
@@ -92,8 +92,9 @@ std::vector<Pose> match_shapes(const Body& body, const Memberships& memberships,
     }
     pose.center = base + pose.center / clusters.mass[at(c)];
 
-    Mat3 a;
+    Mat3 a, a0;  // A and A0
     a.m.fill(0);
+    a0.m.fill(0);
     Vec3 moment, rest_moment;  // rounding of t_c, of T_c and of M_c
     for (const int32_t i : clusters.of(c)) {
       const double weight = body.mass[at(i)] / static_cast<double>(memberships.count(i));
@@ -102,13 +103,16 @@ std::vector<Pose> match_shapes(const Body& body, const Memberships& memberships,
       moment += now;
       rest_moment += weight * rest;
       for (int row = 0; row < 3; ++row) {
-        for (int column = 0; column < 3; ++column) a(row, column) += now[row] * rest[column];
+        for (int column = 0; column < 3; ++column) {
+          a(row, column) += now[row] * rest[column];
+          a0(row, column) += weight * rest[row] * rest[column];
+        }
       }
     }
     const Rotation best = closest_rotation(a, clusters.rotation[at(c)]);
-    pose.rotation = best.r;
+    pose.map = goal_map(volume_share, a, a0, best.r);
     // Otherwise it would push the cluster, and change the body's momentum, in every iteration.
-    pose.center += (moment - best.r * rest_moment) / clusters.mass[at(c)];
+    pose.center += (moment - pose.map * rest_moment) / clusters.mass[at(c)];
     clusters.rotation[at(c)] = best.r;
     clusters.degenerate[at(c)] = best.degenerate;
   }
@@ -121,7 +125,7 @@ Vec3 goal(const Body& body, const Memberships& memberships, const Clusters& clus
   if (memberships.count(i) == 0) return x;
   Vec3 sum;
   for (const int32_t c : memberships.of(i)) {
-    sum += poses[at(c)].center + poses[at(c)].rotation * (body.rest_position(i) - clusters.rest_center[at(c)]);
+    sum += poses[at(c)].center + poses[at(c)].map * (body.rest_position(i) - clusters.rest_center[at(c)]);
   }
   return sum / static_cast<double>(memberships.count(i));
 }
@@ -165,7 +169,7 @@ void substep(const Setup& setup, const Memberships& memberships, int64_t index, 
   std::vector<Vec3> earlier = y;  // one iteration ago
   Vec3 pushed_earlier = pushed;
   for (int32_t iteration = 0; iteration < iterations; ++iteration) {
-    const std::vector<Pose> poses = match_shapes(body, memberships, y, state.clusters);
+    const std::vector<Pose> poses = match_shapes(body, parameters.volume_share, memberships, y, state.clusters);
     const std::vector<Vec3> now = y;
     Vec3 pushed_now;
     for (int32_t i = 0; i < n; ++i) {

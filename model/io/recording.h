@@ -15,7 +15,7 @@
 namespace cutproof::io {
 
 // The only version that is written and read.
-inline constexpr int32_t kFormatVersion = 8;
+inline constexpr int32_t kFormatVersion = 9;
 
 // One moment of one body: the state after a span of stages. A full recording has one after each due stage and at the
 // end of each frame; a short one may have the ends of frames alone. Snapshot 0 is the state as loaded (stage: skin).

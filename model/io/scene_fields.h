@@ -175,6 +175,10 @@ void describe(auto& v, StepParameters& s) {
   v.field(s.stiffness,
           {"stiffness", "k, stiffness per mass; `implicit` only, with κ = k dt (dt + τ) and s = κ / (1 + κ).",
            between(0, 1e15, "1/s²")});
+  v.field(s.volume_share, {"volume_share",
+                           "β, the share of k that keeps the volume of each cluster: more of it, a greater Poisson "
+                           "ratio (method.md §3). `implicit` only.",
+                           between(0, 0.999)});
   v.field(s.relaxation, {"relaxation", "s; `published` only.", above(0, 1)});
   v.field(s.acceleration, {"acceleration",
                            "`chebyshev`: the same answer in fewer, slightly dearer iterations; the energy may rise in "

@@ -231,6 +231,11 @@ void check(const StepParameters& s, const Place& at) {
         .fail("The solver \"published\" has no elastic modulus, and so no viscosity.",
               "Choose \"solver\": \"implicit\", or leave \"retardation\" out.");
   }
+  if (s.solver == Solver::published && s.volume_share != 0) {
+    at.inner("volume_share")
+        .fail("The solver \"published\" has no elastic modulus, and so no share of it.",
+              "Choose \"solver\": \"implicit\", or leave \"volume_share\" out.");
+  }
 }
 
 void check(const DetectFields& s, const Place& at) {

@@ -52,7 +52,8 @@ void add_conditions(const MeshSpec&, ordered_json& schema) { schema["properties"
 void add_conditions(const StepParameters&, ordered_json& schema) {
   schema["if"] = field_is("solver", {{"const", name_of(Solver::published)}});
   schema["then"]["properties"] = {{"acceleration", {{"const", name_of(Acceleration::none)}}},
-                                  {"retardation", {{"const", 0}}}};
+                                  {"retardation", {{"const", 0}}},
+                                  {"volume_share", {{"const", 0}}}};
 }
 void add_conditions(const DetectFields&, ordered_json& schema) {
   schema["if"] = field_is("criterion", {{"not", {{"const", name_of(Criterion::distance)}}}});

@@ -181,6 +181,9 @@ Defect parameter_defect(const Setup& setup) {
   if (setup.step.solver == Solver::published && setup.step.retardation != 0) {
     return SetupDefect{"step/retardation", "The solver \"published\" has no elastic modulus, and so no viscosity."};
   }
+  if (setup.step.volume_share != 0 && (setup.step.solver == Solver::published || !(setup.step.volume_share < 1))) {
+    return SetupDefect{"step/volume_share", "This should be below 1, and 0 with the solver \"published\"."};
+  }
   if (setup.detect.criterion != Criterion::distance && setup.detect.remove != RemovedEnds::both) {
     return SetupDefect{"detect/remove", fmt::format("The criterion \"{}\" judges particles, not edges.",
                                                     name_of(setup.detect.criterion))};

@@ -92,7 +92,8 @@ TEST(Fields, AreTheMembersOfASetupEachOnce) {
   const auto& [name, grid, node, particle_at, rest, edge_offsets, edge_ends, mass, surface_crossing, origin,
                orientation] = body;
   const auto& [nodes, spacing] = grid;
-  const auto& [solver, substeps, iterations, stiffness, relaxation, acceleration, damping, retardation, gravity] = step;
+  const auto& [solver, substeps, iterations, stiffness, volume_share, relaxation, acceleration, damping, retardation,
+               gravity] = step;
   const auto& [criterion, remove, epsilon, strain, without_blade] = detect;
   const auto& [debris] = split;
   const auto& [merge_rule] = merge;
@@ -100,10 +101,10 @@ TEST(Fields, AreTheMembersOfASetupEachOnce) {
   const auto& [wanted, alpha, fit_cuts] = skin;
   const auto& [length, blade_depth, thickness, friction] = blade;
   visited.expect_once(name, nodes, spacing, node, particle_at, rest, edge_offsets, edge_ends, mass, surface_crossing,
-                      origin, orientation, solver, substeps, iterations, stiffness, relaxation, acceleration, damping,
-                      retardation, gravity, criterion, remove, epsilon, strain, without_blade, debris, merge_rule,
-                      expand_rule, depth, wanted, alpha, fit_cuts, walls, grips, has_blade, length, blade_depth,
-                      thickness, friction, substep_length, blade_moves, stroke_end);
+                      origin, orientation, solver, substeps, iterations, stiffness, volume_share, relaxation,
+                      acceleration, damping, retardation, gravity, criterion, remove, epsilon, strain, without_blade,
+                      debris, merge_rule, expand_rule, depth, wanted, alpha, fit_cuts, walls, grips, has_blade, length,
+                      blade_depth, thickness, friction, substep_length, blade_moves, stroke_end);
 }
 
 template <class Entry>

@@ -130,7 +130,7 @@ def read_all(stem):
                 require(file.attrs["cutproof_file"] == f"recording {name}".encode(), f"{stem}: cutproof_file of {name}")
         require(len(ids) == 1, f"{stem}: files of different recordings")
         require(index.attrs["cutproof_file"] == b"recording index", f"{stem}: cutproof_file")
-        require(index.attrs["cutproof_format"] == 8, f"{stem}: cutproof_format")
+        require(index.attrs["cutproof_format"] == 9, f"{stem}: cutproof_format")
     return files
 
 

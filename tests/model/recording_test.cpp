@@ -57,6 +57,7 @@ Setup block_setup(int32_t nx, int32_t ny, int32_t nz) {
   setup.step.substeps = 2;
   setup.step.acceleration = Acceleration::chebyshev;
   setup.step.retardation = 0.003;
+  setup.step.volume_share = 0.3;
   setup.substep_length = {0.004, 0.005, 0.1 / 3};
   setup.stroke_end = {1, -1};
   return setup;
@@ -64,7 +65,7 @@ Setup block_setup(int32_t nx, int32_t ny, int32_t nz) {
 
 // A blade that is up in frame 0, comes down in frame 1 and is up again in frame 2; walls; a pinned and a moving grip.
 void add_surroundings(Setup& setup) {
-  setup.step = {Solver::published, 2, 7, 1e-310, 0.3, Acceleration::none, -0.0, 0, {0, 0, -9.81}};
+  setup.step = {Solver::published, 2, 7, 1e-310, 0, 0.3, Acceleration::none, -0.0, 0, {0, 0, -9.81}};
   setup.detect = {Criterion::strain, RemovedEnds::both, 1.5000000000000002, 1.2, true};
   setup.split.debris = 3;
   setup.merge.rule = MergeRule::published;

@@ -108,7 +108,7 @@ class Scrambler {
     describe(*this, value);
     if constexpr (std::is_same_v<T, BodySpec>) value.particles = 0;
     if constexpr (std::is_same_v<T, StepParameters>) value.acceleration = Acceleration::none;  // excludes `published`
-    if constexpr (std::is_same_v<T, StepParameters>) value.retardation = 0;                    // likewise
+    if constexpr (std::is_same_v<T, StepParameters>) value.retardation = value.volume_share = 0;  // likewise
     if constexpr (std::is_same_v<T, DetectFields>)
       value.parameters.remove = RemovedEnds::both;  // excludes most criteria
     if constexpr (std::is_same_v<T, WallSpec>) value.side = -1;
@@ -163,8 +163,8 @@ TEST(SceneIo, EveryFieldSurvivesWritingAndReading) {
   const json defaults = json::parse(write_scene(plain));
   for (const char* group : {"clusters", "frame", "step", "detect", "split", "merge", "expand", "skin", "blade"}) {
     for (const auto& [name, value] : tree[group].items()) {
-      // AccelerationIsFor…, RetardationIsFor…, OneEndIsFor…
-      if (name == "acceleration" || name == "retardation" || name == "remove") continue;
+      // AccelerationIsFor…, RetardationIsFor…, VolumeShareIsFor…, OneEndIsFor…
+      if (name == "acceleration" || name == "retardation" || name == "volume_share" || name == "remove") continue;
       EXPECT_NE(value, defaults[group].value(name, json())) << group << "." << name << " kept its default";
     }
   }
@@ -180,7 +180,7 @@ TEST(SceneIo, EveryFieldThatIsWrittenIsReadAgainAlone) {
   const json tree = json::parse(whole);
   for (const char* group : {"clusters", "frame", "step", "detect", "split", "merge", "expand", "skin", "expect"}) {
     for (const auto& [name, value] : tree[group].items()) {
-      if (name == "acceleration" || name == "retardation" || name == "remove") continue;
+      if (name == "acceleration" || name == "retardation" || name == "volume_share" || name == "remove") continue;
       json less = tree;
       less[group].erase(name);
       EXPECT_NE(write_scene(parse_scene(less.dump(), "scene.json")), whole) << group << "." << name;
@@ -389,6 +389,19 @@ TEST(SceneIo, RetardationIsForTheImplicitSolver) {
   tree["step"]["acceleration"] = "none";
   expect_error(tree, "step.retardation", {"published", "implicit", "leave"});
   tree["step"]["retardation"] = 0;
+  EXPECT_EQ(parse_scene(tree.dump(), "scene.json").step.solver, Solver::published);
+}
+
+TEST(SceneIo, VolumeShareIsForTheImplicitSolver) {
+  Scene scene = parse_scene(kSmallest, "scene.json");
+  EXPECT_EQ(scene.step.volume_share, 0);
+  scene.step.volume_share = 0.5;
+  EXPECT_EQ(parse_scene(write_scene(scene), "scene.json").step, scene.step);
+  json tree = json::parse(write_scene(scene));
+  tree["step"]["solver"] = "published";
+  tree["step"]["acceleration"] = "none";
+  expect_error(tree, "step.volume_share", {"published", "implicit", "leave"});
+  tree["step"]["volume_share"] = 0;
   EXPECT_EQ(parse_scene(tree.dump(), "scene.json").step.solver, Solver::published);
 }
 

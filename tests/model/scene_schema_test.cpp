@@ -68,7 +68,7 @@ std::vector<json> bases() {
     add("body", {{"shape", json::parse(write_scene(scene))["body"]["shape"]}, {"particles", 1000}});
   }
   add("body", {{"mesh", {{"file", "a.stl"}, {"unit", 1}, {"repair", true}, {"repair_change", 0}}}, {"spacing", 1}});
-  add("step", {{"solver", "published"}, {"acceleration", "none"}, {"retardation", 0}});
+  add("step", {{"solver", "published"}, {"acceleration", "none"}, {"retardation", 0}, {"volume_share", 0}});
   add("detect", {{"criterion", "geometric"}, {"remove", "both"}});
   json arc = full["blade"];
   arc["strokes"][0]["curve"] = "arc";

@@ -71,7 +71,7 @@ TEST(Search, FindsWhatTryingEverythingFinds) {
           for (const Acceleration acceleration : {Acceleration::none, Acceleration::chebyshev}) {
             if (acceleration == Acceleration::chebyshev && iterations < 2) continue;
             Scene scene;
-            scene.step = {Solver::implicit, substeps, iterations, 1e5, 0.5, acceleration, 0, {}};
+            scene.step = {Solver::implicit, substeps, iterations, 1e5, 0, 0.5, acceleration, 0, {}};
             if (Model::error(scene, weight) <= tolerance) least = std::min(least, Model::cost(scene));
           }
         }
