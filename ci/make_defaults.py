@@ -30,6 +30,7 @@ CONSTANTS = [
     ("flat edge of a skin", "reference_cpu/skin.cpp", r"kFlat = (\S+);", "M8.3"),
     ("greatest eigenvalue", "reference_cpu/step.cpp", r"kGreatestEigenvalue = (\S+);", "M11.1"),
     ("margin of touching, in h", "model/setup.h", r"kTouchMargin = (\S+);", "M11.3"),
+    ("eigenvalues of a flat cluster", "model/setup.h", r"kFlatExtent = (\S+);", "M3.17"),
     ("equal eigenvalues", "reference_cpu/rotation.cpp", r"kSameEigenvalue = (\S+);", "M12.1"),
     ("most frames of a scene", "fixtures/schedule.cpp", r"kMostFrames = (\S+);", "M9.4"),
     ("most substeps of a scene", "fixtures/schedule.cpp", r"kMostSubsteps = (\S+);", "M9.4"),

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "oracles/eigen.h"
 #include "oracles/rounding.h"
 #include "oracles/shape_sums.h"
+#include "oracles/volume_target.h"
 
 namespace cutproof::oracles {
 
@@ -86,6 +88,9 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
   const WeightedRest weighted = weighted_rest(body, clusters);
   const double u = unit_roundoff(state) + kUnitRoundoff;
   std::vector<ClusterMeans> means;
+  std::vector<Mat3> maps = clusters.rotation;
+  std::vector<VolumeTarget> volumes;
+  std::vector<double> volume_rounding;  // of V A0^(1/2), times its share
   std::vector<double> center_rounding;  // rounding of the sum of a cluster's center: squares [m²]
   std::vector<double> absolute;         // both centers of a cluster, as absolute coordinates: at most [m]
   for (int32_t c = 0; c < clusters.count(); ++c) {
@@ -106,6 +111,22 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
     center_rounding.push_back(4 * u * u * dot(mean, mean) + 3 * sum * sum + 3 * u * u * radius * radius);
     const double weights = sum_rounds_at_most(static_cast<double>(members.size()), means[at(c)].mass, heaviest);
     absolute.push_back(2 * absolute_mean_rounding(state, weights));  // deformed and at rest
+    if (const double part = setup.step.volume_share; part > 0) {
+      Eigen::Matrix3d a = Eigen::Matrix3d::Zero(), a0 = a;
+      double size = 0;
+      for (const int32_t i : members) {
+        const Eigen::Vector3d arm = as_eigen(weighted.position[at(i)] - means[at(c)].rest);
+        const Eigen::Vector3d now = weighted.weight[at(i)] * as_eigen(state.x[at(i)] - means[at(c)].current);
+        a += now * arm.transpose();
+        a0 += weighted.weight[at(i)] * arm * arm.transpose();
+        size += now.norm() * arm.norm();
+      }
+      volumes.push_back(volume_target(to_mat3(a), to_mat3(a0), maps[at(c)]));
+      const double sums = sum_rounds(static_cast<double>(members.size())) * u;
+      const double places = u * spread * std::sqrt(a0.trace() * means[at(c)].mass);
+      volume_rounding.push_back(part * volumes.back().rounding(sums * size + places, sums, u));
+      maps[at(c)] = volumes.back().map(part, maps[at(c)]);
+    }
   }
   std::vector<VertexPlace> places(skin.owner.size());
   for (std::size_t v = 0; v < places.size(); ++v) {
@@ -116,11 +137,15 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
     double at_most = 0;
     for (const int32_t c : holders) {
       const ClusterMeans& m = means[at(c)];
-      const Vec3 arm = rest - m.rest, goal = m.current + clusters.rotation[at(c)] * arm;
+      const Vec3 arm = rest - m.rest, goal = m.current + maps[at(c)] * arm;
       if (c == holders.front()) first = goal;
       sum += goal;
       terms += norm(goal - first);
       squares += center_rounding[at(c)] + 4 * u * u * dot(arm, arm);
+      if (!volumes.empty()) {
+        const double off = volume_rounding[at(c)] * volumes[at(c)].lever(arm);
+        squares += off * off;
+      }
       at_most += absolute[at(c)];
     }
     const auto count = static_cast<double>(holders.size());

@@ -188,6 +188,7 @@ void add_dynamics(const Case& c, Vec3 first_node, Setup& setup) {
   setup.step.relaxation = c.relaxation / 10.0;
   if (c.solver == Solver::implicit) setup.step.acceleration = c.acceleration;
   setup.step.damping = c.damping;
+  if (c.solver == Solver::implicit) setup.step.volume_share = c.volume_share / 100.0;
   if (c.solver == Solver::implicit) setup.step.retardation = c.retardation / 10.0 * dt;
   setup.step.gravity = (h / 1000 / (dt * dt)) * whole_vector(c.gravity);
   setup.detect.epsilon = c.epsilon / 10.0;

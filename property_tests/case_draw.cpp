@@ -396,6 +396,8 @@ Case draw_moving_case(uint64_t seed, int size) {
   // By random numbers of its own, as `surface`.
   Random retarded(seed ^ 0x7u);
   if (c.solver == Solver::implicit && retarded.chance(0.3)) c.retardation = retarded.pick({1, 10, 40, 200});
+  Random volume(seed ^ 0x9u);
+  if (c.solver == Solver::implicit && volume.chance(0.6)) c.volume_share = volume.pick({10, 50, 80, 94, 99});
   return c;
 }
 

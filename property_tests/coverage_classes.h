@@ -47,6 +47,7 @@ inline constexpr std::array kCoverageClasses = {
     CoverageClass{"accelerated solver", Occurs::where_bodies_move},
     CoverageClass{"damped", Occurs::where_bodies_move},
     CoverageClass{"retarded", Occurs::where_bodies_move},
+    CoverageClass{"volume kept", Occurs::where_bodies_move},
     CoverageClass{"small dt", Occurs::where_bodies_move},
     CoverageClass{"large dt", Occurs::where_bodies_move},
     // Something was removed.

@@ -62,6 +62,7 @@ void note_parameters(const Setup& setup, const State& before, const State& after
   if (step.acceleration != Acceleration::none) seen["accelerated solver"] = true;
   if (step.damping > 0) seen["damped"] = true;
   if (step.retardation > 0) seen["retarded"] = true;
+  if (step.volume_share > 0) seen["volume kept"] = true;
   if (dt < 0.001) seen["small dt"] = true;
   if (dt > 0.001) seen["large dt"] = true;
 }

@@ -101,6 +101,7 @@ std::string in_words(const Case& c) {
       fmt::format("; the body moves: {} substeps × {} iterations, dt = {} µs", c.substeps, c.iterations, c.time_step);
   if (c.acceleration != Acceleration::none) text += ", accelerated";
   if (c.retardation > 0) text += fmt::format(", retarded by {:g} dt", c.retardation / 10.0);
+  if (c.volume_share > 0) text += fmt::format(", {} % of the stiffness for its volume", c.volume_share);
   if (c.ground) text += ", gravity and a floor";
   if (!c.walls.empty()) text += ", " + counted(c.walls.size(), "wall", "walls");
   if (!c.grips.empty()) text += ", " + counted(c.grips.size(), "grip", "grips");

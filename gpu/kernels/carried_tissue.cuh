@@ -1,6 +1,9 @@
 // Where clusters carry points at and beside their particles (docs/design/method.md §4 and §8). Detection and skin use
 // it to measure how far tissue is from the blade that separates it.
 #pragma once
+#include <type_traits>
+
+#include "gpu/kernels/volume.cuh"
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/team.h"
 #include "gpu/state/device_view.h"
@@ -10,8 +13,24 @@ namespace cutproof::gpu {
 
 inline constexpr int kCenterTeam = 32;  // lanes that find a cluster's centre
 
-// DeviceView::center of a cluster from the present displacements.
-template <class Block>
+// Only these instances contain code for volume: a load without pays nothing.
+template <class Start>
+void by_volume(bool keeps_volume, Start start) {
+  if (keeps_volume) {
+    start(std::true_type{});
+  } else {
+    start(std::false_type{});
+  }
+}
+// For kernels that carry points: clusters of a load that keeps volume carry them by their whole map.
+inline DeviceView with_carried_maps(const DeviceView& w) {
+  DeviceView carrying = w;
+  if (w.keeps_volume != 0) carrying.rotation = w.carried_map;
+  return carrying;
+}
+
+// DeviceView::center of a cluster from the present displacements, and its carried_map.
+template <bool kVolume, class Block>
 CUTPROOF_DEVICE void recenter(const DeviceView& w, const Team<Block, kCenterTeam>& team, int s) {
   const BodyConstants& body = w.body[w.slot_body[s]];
   const int* const members = w.members + w.slot_begin[s];
@@ -41,10 +60,47 @@ CUTPROOF_DEVICE void recenter(const DeviceView& w, const Team<Block, kCenterTeam
     sum[6] += weight;
   });
   const auto total = team.total(sums);
-  if (!team.leads()) return;
   const Float3 moved = {total.v[0], total.v[1], total.v[2]}, rest = {total.v[3], total.v[4], total.v[5]};
   // The rounded T must not move the cluster (docs/design/decisions.md, Momentum and the rounding of sums).
-  const Float3 turned = w.rotation[s] * rest - rest;
+  Float3 turned;
+  if constexpr (kVolume) {
+    typename Team<Block, kCenterTeam>::template Sums<15> products;  // Σ w (d - base) rᵀ and Σ w r rᵀ, r in nodes
+    team.template each_asked<8>(w.slot_size[s], ask, [&](int k, const Member& member) {
+      const float weight = member.now.w / static_cast<float>(member.clusters);
+      const Float3 d = weight * (xyz(member.now) - base), r = nodes_between(center, coordinates(body, member.node));
+      float* const sum = products.of(k);
+      for (int axis = 0; axis < 3; ++axis) {
+        sum[axis] += d.x * r[axis];
+        sum[3 + axis] += d.y * r[axis];
+        sum[6 + axis] += d.z * r[axis];
+        sum[9 + axis] += weight * (r.x * r[axis]);
+      }
+      sum[12] += weight * (r.y * r.y);
+      sum[13] += weight * (r.y * r.z);
+      sum[14] += weight * (r.z * r.z);
+    });
+    const auto of = team.total(products);
+    if (!team.leads()) return;
+    Matrix3 map = w.rotation[s];
+    turned = map * rest - rest;
+    if (body.volume_share > 0) {
+      const float per_h = 1.0f / body.h;
+      const float a0[3][3] = {
+          {of.v[9], of.v[10], of.v[11]}, {of.v[10], of.v[12], of.v[13]}, {of.v[11], of.v[13], of.v[14]}};
+      Matrix3 change;
+      for (int row = 0; row < 3; ++row) {
+        const float mean = moved[row] / total.v[6];
+        for (int k = 0; k < 3; ++k) change(row, k) = per_h * (of.v[3 * row + k] - mean * (per_h * rest[k]));
+      }
+      map = goal_map(body.volume_share, a0, change, map);
+      turned = map * rest;
+      for (int k = 0; k < 9; k += 4) map.m[k] += 1.0f;
+    }
+    w.carried_map[s] = map;
+  } else {
+    if (!team.leads()) return;
+    turned = w.rotation[s] * rest - rest;
+  }
   w.center[s] = base + (1.0f / total.v[6]) * (moved - turned);
 }
 

@@ -18,6 +18,7 @@
 
 #include "gpu/kernels/carried_tissue.cuh"
 #include "gpu/kernels/lowered_plane.cuh"
+#include "gpu/kernels/symmetric.cuh"
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/team.h"
 #include "gpu/state/device_view.h"
@@ -348,33 +349,6 @@ CUTPROOF_DEVICE inline bool is_swept(const BodyConstants& body, const MoveF& mov
 
 // ---- strain
 
-// Cyclic Jacobi of a symmetric matrix: eigenvalues on the diagonal of `n`, eigenvectors in the columns of `v`.
-CUTPROOF_DEVICE inline void diagonalise(float (&n)[3][3], float (&v)[3][3]) {
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) v[row][column] = row == column ? 1.0f : 0.0f;
-  }
-  for (int sweep = 0; sweep < 6; ++sweep) {
-    for (int pair = 0; pair < 3; ++pair) {
-      const int p = pair == 2 ? 1 : 0, q = pair == 0 ? 1 : 2, r = 3 - p - q;
-      if (n[p][q] == 0) continue;
-      const float theta = (n[q][q] - n[p][p]) / (2.0f * n[p][q]);
-      const float t = copysignf(1.0f, theta) / (fabsf(theta) + sqrtf(1.0f + theta * theta));
-      const float c = 1.0f / sqrtf(1.0f + t * t), s = t * c;
-      n[p][p] -= t * n[p][q];
-      n[q][q] += t * n[p][q];
-      n[p][q] = n[q][p] = 0;
-      const float rp = n[r][p], rq = n[r][q];
-      n[r][p] = n[p][r] = c * rp - s * rq;
-      n[r][q] = n[q][r] = s * rp + c * rq;
-      for (int k = 0; k < 3; ++k) {
-        const float vp = v[k][p], vq = v[k][q];
-        v[k][p] = c * vp - s * vq;
-        v[k][q] = s * vp + c * vq;
-      }
-    }
-  }
-}
-
 // The greatest stretch of the deformation gradient A A0⁺, with A0 = Σ w r rᵀ (r = X - T) and A = A0 + B, B = Σ w e rᵀ
 // (e: displacement less its mean). As with the pseudo-inverse, directions without extent are left out. Not finite if B
 // is not.
@@ -471,16 +445,24 @@ CUTPROOF_KERNEL(flag_strained_clusters_kernel);
 
 // DeviceView::center of the clusters that carry an end of an edge whose nearer end is removed. (They may include
 // clusters that an earlier detection of this frame marked.)
-template <class Block>
+template <bool kVolume, class Block>
 CUTPROOF_DEVICE void recenter_asked_clusters_kernel(Block& block, DeviceView w) {
   using namespace detect_detail;
   const Team<Block, kCenterTeam> team(block);
   for (int64_t i = team.first(); i < w.counters->slots_used; i += team.stride()) {
     const int s = static_cast<int>(i);
-    if (w.slot_size[s] > 0 && w.center_asked[s] == removal_code(w, w.slot_body[s])) recenter(w, team, s);
+    if (w.slot_size[s] > 0 && w.center_asked[s] == removal_code(w, w.slot_body[s])) recenter<kVolume>(w, team, s);
   }
 }
-CUTPROOF_KERNEL(recenter_asked_clusters_kernel);
+template <bool kVolume>
+struct recenter_asked_clusters_kernel_object {
+  static constexpr const char* kName = "recenter_asked_clusters_kernel";
+  static constexpr int kMaxThreads = 256;
+  template <class Block>
+  CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w) const {
+    recenter_asked_clusters_kernel<kVolume>(block, w);
+  }
+};
 
 // Judges the particles of every body without a geometric cut. kNearer: some body removes the nearer ends of edges.
 template <bool kNearer, class Block>
@@ -581,9 +563,11 @@ void enqueue_detect(Launcher& launcher, const DeviceView& w, const Plan& plan) {
     launcher.items(flag_particles_kernel_object<nearer.value>{}, w.particles, w);
     if (plan.geometric) launcher.items(flag_swept_particles_kernel_object{}, w.particles, w);
     if constexpr (nearer.value) {
-      launcher.teams(recenter_asked_clusters_kernel_object{}, kCenterTeam, w.slots_expected, w);
+      by_volume(w.keeps_volume != 0, [&](auto volume) {
+        launcher.teams(recenter_asked_clusters_kernel_object<volume.value>{}, kCenterTeam, w.slots_expected, w);
+      });
     }
-    launcher.items(remove_particles_kernel_object<nearer.value>{}, w.particles, w);
+    launcher.items(remove_particles_kernel_object<nearer.value>{}, w.particles, with_carried_maps(w));
   };
   if (plan.nearer) {
     by_ends(std::true_type{});

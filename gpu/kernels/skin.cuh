@@ -319,7 +319,7 @@ void enqueue_skin_clusters(Launcher& launcher, const DeviceView& w, const Plan&)
 
 // DeviceView::center of the clusters that carry vertices; others need none. made: in frames with Counters::changing
 // they are done.
-template <class Block>
+template <bool kVolume, class Block>
 CUTPROOF_DEVICE void recenter_clusters_kernel(Block& block, const DeviceView& w, bool made) {
   using namespace skin_detail;
   if (made && w.counters->changing != 0) return;
@@ -327,10 +327,18 @@ CUTPROOF_DEVICE void recenter_clusters_kernel(Block& block, const DeviceView& w,
   for (int64_t i = team.first(); i < w.counters->slots_used; i += team.stride()) {
     const int s = static_cast<int>(i);
     if (w.slot_size[s] == 0 || !skinned(w, w.slot_body[s]) || w.under_skin[s] == 0) continue;
-    recenter(w, team, s);
+    recenter<kVolume>(w, team, s);
   }
 }
-CUTPROOF_KERNEL(recenter_clusters_kernel);
+template <bool kVolume>
+struct recenter_clusters_kernel_object {
+  static constexpr const char* kName = "recenter_clusters_kernel";
+  static constexpr int kMaxThreads = 256;
+  template <class Block>
+  CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, bool made) const {
+    recenter_clusters_kernel<kVolume>(block, w, made);
+  }
+};
 
 namespace skin_detail {
 
@@ -395,8 +403,10 @@ CUTPROOF_KERNEL(place_vertices_kernel);
 // made: as for the centres.
 template <class Launcher>
 void enqueue_skin_positions(Launcher& launcher, const DeviceView& w, bool made) {
-  launcher.teams(recenter_clusters_kernel_object{}, kCenterTeam, w.slots_expected, w, made);
-  launcher.items(place_vertices_kernel_object{}, w.vertex_capacity, w, made);
+  by_volume(w.keeps_volume != 0, [&](auto volume) {
+    launcher.teams(recenter_clusters_kernel_object<volume.value>{}, kCenterTeam, w.slots_expected, w, made);
+  });
+  launcher.items(place_vertices_kernel_object{}, w.vertex_capacity, with_carried_maps(w), made);
 }
 
 }  // namespace cutproof::gpu

@@ -53,6 +53,7 @@ Extents extents_of(const StagingBuffers& loaded, Capacity capacity) {
   }
   // The one set of kernels for bodies with retardation needs every array (plan.h).
   extents.retarded = some_body(loaded, [](const BodyConstants& b) { return b.retardation > 0; });
+  extents.keeps_volume = some_body(loaded, [](const BodyConstants& b) { return b.volume_share > 0; });
   extents.accelerated = some_body(
       loaded, [](const BodyConstants& b) { return b.acceleration != Acceleration::none || b.retardation > 0; });
   extents.any_contact = some_body(loaded, [](const BodyConstants& b) {

@@ -50,7 +50,7 @@ struct BodyConstants {
   Solver solver;
   Acceleration acceleration;
   int substeps, iterations, last_iterations;  // last: of the last substep of a frame
-  float stiffness, relaxation, damping, retardation;
+  float stiffness, volume_share, relaxation, damping, retardation;
   Float3 gravity;
   Criterion criterion;
   RemovedEnds remove;
@@ -217,6 +217,7 @@ struct Extents {
   int accelerated = 0;        // some body's iterations are accelerated
   int any_contact = 0;        // some body has a blade, a wall or a grip
   int retarded = 0;           // some body has retardation
+  int keeps_volume = 0;       // some body keeps its volume
   int any_crossing = 0;       // some body has Body::surface_crossing
   int kept_count = 0;         // loaded skin vertices on edges that a cut has opened
   int slot_capacity = 0, member_capacity = 0, vertex_capacity = 0, cell_capacity = 0, addition_capacity = 0;

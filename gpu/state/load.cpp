@@ -72,6 +72,7 @@ void add_constants(StagingBuffers& staging, const Setup& setup, const State& sta
   body.iterations = setup.step.iterations;
   body.last_iterations = setup.step.iterations - setup.withheld_iterations;
   body.stiffness = f(setup.step.stiffness);
+  body.volume_share = f(setup.step.volume_share);
   body.relaxation = f(setup.step.relaxation);
   body.damping = f(setup.step.damping);
   body.retardation = f(setup.step.retardation);

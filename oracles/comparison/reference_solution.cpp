@@ -64,9 +64,9 @@ class LinearStage {
     for (int axis = 0; axis < 3; ++axis) refactor(axis, given());
   }
 
-  // Positions that minimise E over x and t with these rotations, walls held.
-  std::vector<Vec3> positions(const std::vector<Mat3>& rotation) {
-    const std::vector<Vec3> turned = turned_offsets(problem_, rotation);
+  // Positions that minimise E over x and t with these maps of clusters, walls held.
+  std::vector<Vec3> positions(const std::vector<Mat3>& map) {
+    const std::vector<Vec3> turned = turned_offsets(problem_, map);
     std::vector<Vec3> x = problem_.predicted;
     for (int axis = 0; axis < 3; ++axis) minimise(axis, turned, x);
     return x;
@@ -198,7 +198,7 @@ ReferenceSolution solution_of(const SubstepProblem& problem, const std::vector<M
   if (!problem.contacts.path_matters()) {
     LinearStage linear(problem);
     ReferenceSolution result = alternated(problem, std::move(first), previous, [&](const Poses& poses) {
-      return std::optional(linear.positions(poses.rotation));
+      return std::optional(linear.positions(poses.map));
     });
     result.is_minimum = result.converged;
     return result;
@@ -214,7 +214,7 @@ ReferenceSolution solution_of(const SubstepProblem& problem, const std::vector<M
   std::vector<Vec3> center;
   ReferenceSolution result = alternated(problem, std::move(first), rotation, [&](const Poses& poses) {
     if (center.empty()) center = poses.center;
-    rest = contacts.rest(poses.rotation, center);
+    rest = contacts.rest(poses.map, center);
     return rest.found ? std::optional(rest.x) : std::nullopt;
   });
   result.is_minimum = result.converged && !rest.x.empty() && contacts.is_strict_minimum(rest);
@@ -305,7 +305,7 @@ std::vector<Vec3> substep_gradient(const Setup& setup, const State& state, const
   for (int32_t c = 0; c < problem.clusters.count(); ++c) {
     auto offset = problem.offset.begin() + problem.clusters.offsets[at(c)];
     for (const int32_t i : problem.clusters.of(c)) {
-      const Vec3 d = y[at(i)] - poses.center[at(c)] - poses.rotation[at(c)] * *offset++;
+      const Vec3 d = y[at(i)] - poses.center[at(c)] - poses.map[at(c)] * *offset++;
       gradient[at(i)] += problem.stiffness * problem.rest.weight[at(i)] * d;
     }
   }

@@ -9,6 +9,7 @@
 #include "oracles/eigen.h"
 #include "oracles/oracles.h"
 #include "oracles/support.h"
+#include "oracles/volume_target.h"
 
 namespace cutproof::oracles {
 namespace {
@@ -76,6 +77,7 @@ SubstepProblem::SubstepProblem(const Setup& setup, const State& state)
       retardation(setup.step.retardation),
       share(dt / (dt + retardation)),
       stiffness(setup.step.stiffness),
+      volume_share(setup.step.volume_share),
       alive(state.alive),
       held(at(body.particle_count()), 0),
       start(state.x),
@@ -111,7 +113,12 @@ SubstepProblem::SubstepProblem(const Setup& setup, const State& state)
 
   for (int32_t c = 0; c < clusters.count(); ++c) {
     const Vec3 center = cluster_means(rest, clusters, start, c).rest;
-    for (const int32_t i : clusters.of(c)) offset.push_back(rest.position[at(i)] - center);
+    Eigen::Matrix3d of_cluster = Eigen::Matrix3d::Zero();
+    for (const int32_t i : clusters.of(c)) {
+      offset.push_back(rest.position[at(i)] - center);
+      of_cluster += rest.weight[at(i)] * as_eigen(offset.back()) * as_eigen(offset.back()).transpose();
+    }
+    moments.push_back(to_mat3(of_cluster));
   }
 }
 
@@ -158,17 +165,24 @@ Poses poses_at(const SubstepProblem& problem, const std::vector<Vec3>& x, const 
       a += as_eigen(problem.rest.weight[at(i)] * (y[at(i)] - center)) * as_eigen(*offset++).transpose();
     }
     poses.center.push_back(center);
-    poses.rotation.push_back(best_rotation(a, previous[at(c)]));
+    const Mat3 r = best_rotation(a, previous[at(c)]);
+    poses.rotation.push_back(r);
+    poses.volume.push_back(r);
+    poses.map.push_back(r);
+    if (problem.volume_share == 0) continue;
+    const VolumeTarget volume = volume_target(to_mat3(a), problem.moments[at(c)], r);
+    poses.volume.back() = volume.v;
+    poses.map.back() = volume.map(problem.volume_share, r);
   }
   return poses;
 }
 
-std::vector<Vec3> turned_offsets(const SubstepProblem& problem, const std::vector<Mat3>& rotation) {
+std::vector<Vec3> turned_offsets(const SubstepProblem& problem, const std::vector<Mat3>& map) {
   std::vector<Vec3> mean(at(problem.body.particle_count()));
   const Clusters& clusters = problem.clusters;
   for (int32_t c = 0; c < clusters.count(); ++c) {
     auto offset = problem.offset.begin() + clusters.offsets[at(c)];
-    for (const int32_t i : clusters.of(c)) mean[at(i)] += rotation[at(c)] * *offset++;
+    for (const int32_t i : clusters.of(c)) mean[at(i)] += map[at(c)] * *offset++;
   }
   for (int32_t i = 0; i < problem.body.particle_count(); ++i) {
     const auto count = problem.memberships.of(i).size();
@@ -180,7 +194,7 @@ std::vector<Vec3> turned_offsets(const SubstepProblem& problem, const std::vecto
 namespace {
 // [n] g_i; of a particle in no cluster, where it wants to be anyway.
 std::vector<Vec3> goals_of(const SubstepProblem& problem, const Poses& poses) {
-  std::vector<Vec3> goal = turned_offsets(problem, poses.rotation);
+  std::vector<Vec3> goal = turned_offsets(problem, poses.map);
   for (int32_t i = 0; i < problem.body.particle_count(); ++i) {
     const auto clusters = problem.memberships.of(i);
     if (clusters.empty()) {
@@ -217,8 +231,10 @@ double energy_at(const SubstepProblem& problem, const std::vector<Vec3>& x, cons
   for (int32_t c = 0; c < problem.clusters.count(); ++c) {
     auto offset = problem.offset.begin() + problem.clusters.offsets[at(c)];
     for (const int32_t i : problem.clusters.of(c)) {
-      const Vec3 d = y[at(i)] - poses.center[at(c)] - poses.rotation[at(c)] * *offset++;
-      elastic += problem.rest.weight[at(i)] * dot(d, d);
+      const Vec3 from_center = y[at(i)] - poses.center[at(c)], arm = *offset++;
+      const Vec3 d = from_center - poses.rotation[at(c)] * arm, e = from_center - poses.volume[at(c)] * arm;
+      elastic +=
+          problem.rest.weight[at(i)] * ((1 - problem.volume_share) * dot(d, d) + problem.volume_share * dot(e, e));
     }
   }
   return inertial / (2 * problem.dt * (problem.dt + problem.retardation)) + problem.stiffness / 2 * elastic;

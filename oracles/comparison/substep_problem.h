@@ -24,14 +24,15 @@ struct SubstepProblem {
   double dt = 0;
   double retardation = 0;  // τ
   double share = 1;        // dt / (dt + τ)
-  double stiffness = 0;
+  double stiffness = 0, volume_share = 0;
   double s = 0;  // k dt (dt + τ) / (1 + k dt (dt + τ))
   std::vector<uint8_t> alive, held;
   std::vector<Vec3> start;      // x_prev
   std::vector<Vec3> predicted;  // x~ of method.md §3, before contacts; of held particles, where the grip puts them
   std::vector<Vec3> predicted_ahead;  // its y~
   WeightedRest rest;
-  std::vector<Vec3> offset;  // [members] X_i − T_c
+  std::vector<Vec3> offset;   // [members] X_i − T_c
+  std::vector<Mat3> moments;  // [m] Σ w (X_i − T_c)(X_i − T_c)ᵀ
   Memberships memberships;
   std::array<double, 3> low, high;  // walls: low <= x <= high
   Contact contacts;
@@ -56,17 +57,19 @@ std::vector<Vec3> first_positions(const SubstepProblem& problem);
 struct Poses {
   std::vector<Vec3> center;    // t_c
   std::vector<Mat3> rotation;  // R_c
+  std::vector<Mat3> volume;    // V_c; without a share of it, R_c
+  std::vector<Mat3> map;       // B_c
 };
 // The best where elasticity acts when particles are at x. Where many rotations are, the one nearest to `previous`.
 Poses poses_at(const SubstepProblem& problem, const std::vector<Vec3>& x, const std::vector<Mat3>& previous);
 
-// [n] the mean over a particle's clusters of R_c (X_i − T_c), to which the mean of t_c is added to give g_i.
-std::vector<Vec3> turned_offsets(const SubstepProblem& problem, const std::vector<Mat3>& rotation);
+// [n] the mean over a particle's clusters of B_c (X_i − T_c), to which the mean of t_c is added to give g_i.
+std::vector<Vec3> turned_offsets(const SubstepProblem& problem, const std::vector<Mat3>& map);
 
 // One plain iteration from x, whose poses are given.
 std::vector<Vec3> plain_iterate(const SubstepProblem& problem, const std::vector<Vec3>& x, const Poses& poses);
 
-// E at positions x with these t and R [kg m²/s²]. Held particles have no inertia: their positions are given.
+// E at positions x with these t, R and V [kg m²/s²]. Held particles have no inertia: their positions are given.
 double energy_at(const SubstepProblem& problem, const std::vector<Vec3>& x, const Poses& poses);
 
 }  // namespace cutproof::oracles

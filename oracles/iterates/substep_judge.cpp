@@ -13,6 +13,7 @@
 #include "oracles/rest_places.h"
 #include "oracles/step_model/step_model.h"
 #include "oracles/support.h"
+#include "oracles/volume_target.h"
 
 namespace cutproof::oracles {
 namespace {
@@ -75,6 +76,7 @@ SubstepJudge::SubstepJudge(const Setup& setup, int64_t frame, int32_t substep, c
   coupled_ = components_of_coupling(TissueGraph(body, began.alive), began.clusters);
   holders_ = membership_counts(began.clusters, n);
   arm_.resize(began.clusters.members.size());
+  volume_off_.resize(arm_.size());
   lever_.resize(at(n));
   for (int32_t c = 0; c < began.clusters.count(); ++c) {
     const auto members = began.clusters.of(c);
@@ -88,12 +90,15 @@ SubstepJudge::SubstepJudge(const Setup& setup, int64_t frame, int32_t substep, c
     }
     cluster.rest = base + moment / cluster.mass;
     cluster.is_line = is_on_a_line(body, members);
+    Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
     for (std::size_t m = 0; m < members.size(); ++m) {
       Vec3& arm = arm_[at(began.clusters.offsets[at(c)]) + m];
       arm = (body.rest_position(members[m]) - base) - moment / cluster.mass;
       cluster.radius = std::max(cluster.radius, norm(arm));
       lever_[at(members[m])] += dot(arm, arm);
+      moments += weight(members[m]) * as_eigen(arm) * as_eigen(arm).transpose();
     }
+    cluster.moments = to_mat3(moments);
   }
   held_.resize(at(n));
   for (const Grip& grip : setup.grips) {
@@ -120,7 +125,9 @@ SubstepJudge::SubstepJudge(const Setup& setup, int64_t frame, int32_t substep, c
     // A backend begins a later substep from places that are not rounded yet. Those shown are off by one rounding, and
     // dt v, the difference of two places, by two. A group sums what its particles have in common, so the rounding is
     // that of the greatest place in the particle's clusters.
-    const double went_on = first_ ? 0 : 3 * u_ * std::max(norm(stored(i, x)), shared[at(i)]);
+    // A group's map that stretches has two sums more of that size, its linear part in the place and in the velocity.
+    const double times = step.volume_share > 0 ? 5 : 3;
+    const double went_on = first_ ? 0 : times * u_ * std::max(norm(stored(i, x)), shared[at(i)]);
     begin_squares_.push_back(square(u_ * norm(stored(i, predicted_.back()))) + square(4 * u_ * inertia_.back()) +
                              square(2 * places_u_ * norm(predicted_.back())) + square(went_on));
     const double height = contact_.height_at_start(x);
@@ -220,7 +227,20 @@ void SubstepJudge::iteration(int32_t k, const State* earlier, const State& now, 
     }
     const double rounds = sum_rounds(static_cast<double>(members.size())) * u_;
     const Mat3& previous = k == 0 ? clusters.rotation[at(c)] : now.clusters.rotation[at(c)];
-    rotation(c, a, rounds * size + seen + 4 * u_ * a.norm(), previous, next.clusters);
+    const double a_off = rounds * size + seen + 4 * u_ * a.norm();
+    rotation(c, a, a_off, previous, next.clusters);
+    Mat3 map = next.clusters.rotation[at(c)];
+    if (const double share = setup_.step.volume_share; share > 0) {
+      const VolumeTarget volume = volume_target(to_mat3(a), cluster.moments, map);
+      const double off = share * volume.rounding(a_off, rounds, u_);
+      inconclusive_ += volume.is_open(a_off, rounds, u_);
+      for (std::size_t m = 0; m < members.size(); ++m) {
+        double& of_member = volume_off_[at(clusters.offsets[at(c)]) + m];
+        of_member = off * volume.lever(arm[m]);
+        goal_squares[at(members[m])] += square(of_member);
+      }
+      map = volume.map(share, map);
+    }
     const bool is_single = began_.precision == Precision::binary32;
     const Vec3 center = base + mean;
     const double squares = square(2 * u_ * norm(is_single ? center - cluster.rest : center)) +
@@ -228,7 +248,7 @@ void SubstepJudge::iteration(int32_t k, const State* earlier, const State& now, 
                            (is_single ? 0 : square(u_ * norm(cluster.rest)));
     cluster.center_off = std::sqrt(squares);
     for (std::size_t m = 0; m < members.size(); ++m) {
-      sum[at(members[m])] += center + next.clusters.rotation[at(c)] * arm[m];
+      sum[at(members[m])] += center + map * arm[m];
       goal_squares[at(members[m])] += squares;
     }
   }
@@ -526,13 +546,17 @@ void SubstepJudge::sums() {
     for (int32_t c = 0; c < began_.clusters.count(); ++c) {
       const auto members = began_.clusters.of(c);
       if (members.empty()) continue;
-      double mass = 0;
+      double mass = 0, stretched = 0;
       Vec3 pulls;
-      for (const int32_t i : members) {
-        mass += mass_of[at(i)] / holders_[at(i)];
-        pulls += mass_of[at(i)] / holders_[at(i)] * pull_of[at(i)];
+      for (std::size_t m = 0; m < members.size(); ++m) {
+        const int32_t i = members[m];
+        const double own = mass_of[at(i)] / holders_[at(i)];
+        mass += own;
+        pulls += own * pull_of[at(i)];
+        stretched += own * volume_off_[at(began_.clusters.offsets[at(c)]) + m] * norm(pull_of[at(i)]);
       }
       Part& part = parts[at(coupled_.label[at(members.front())])];
+      part.along_common += shared_ * stretched;
       const double off = shared_ * clusters_[at(c)].center_off;
       part.squares += square(off * mass);
       part.along_squares += square(off * norm(pulls));

@@ -61,6 +61,7 @@ class SubstepJudge {
   struct Cluster {
     double mass = 0, radius = 0;
     Vec3 rest;              // T
+    Mat3 moments;           // A0
     bool is_line = false;   // at rest a line; of radius 0 a point
     double center_off = 0;  // what rounds in its center in this iteration [m]
   };
@@ -107,11 +108,12 @@ class SubstepJudge {
   Partition coupled_;
   std::vector<int32_t> holders_;
   std::vector<Cluster> clusters_;
-  std::vector<Vec3> arm_;                  // [members] X - T
-  std::vector<double> lever_;              // [n] √(Σ_c |X − T_c|²) / n_i
-  std::vector<double> inertia_;            // [n] |dt v| + |dt² g|, which may all but cancel
-  std::vector<Vec3> predicted_;            // [n] x~
-  std::vector<double> begin_squares_;      // [n] of what rounds in x~ [m²]
+  std::vector<Vec3> arm_;              // [members] X - T
+  std::vector<double> lever_;          // [n] √(Σ_c |X − T_c|²) / n_i
+  std::vector<double> volume_off_;     // [members] what rounds in where a volume's map puts it, in this iteration [m]
+  std::vector<double> inertia_;        // [n] |dt v| + |dt² g|, which may all but cancel
+  std::vector<Vec3> predicted_;        // [n] x~
+  std::vector<double> begin_squares_;  // [n] of what rounds in x~ [m²]
   std::vector<std::optional<Vec3>> held_;  // [n] where a grip puts it
   std::vector<uint8_t> sides_;             // [n] bit 0: positive, bit 1: negative: those that it may have begun on
   std::vector<Free> free_;

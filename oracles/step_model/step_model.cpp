@@ -18,6 +18,7 @@
 #include "oracles/rest_places.h"
 #include "oracles/rounding.h"
 #include "oracles/shape_sums.h"
+#include "oracles/volume_target.h"
 
 namespace cutproof::oracles {
 namespace {
@@ -123,6 +124,7 @@ StepModel::StepModel(const Setup& setup, const State& before, double unit_roundo
       cluster.arms += weight_[at(members[k])] * norm(arm);
       lever_[at(members[k])] += dot(arm, arm);
     }
+    cluster.moments = moments;
     cluster.inverse = pseudoinverse(moments);
     cluster.extent = members.size() == 1           ? Cluster::Extent::point
                      : is_on_a_line(body, members) ? Cluster::Extent::line
@@ -498,7 +500,27 @@ void StepModel::Run::match_shapes(int32_t s, int32_t j) {
       r = rotation_of(c, a, size.sum(), u_ * farthest / share_ * cluster.arms, is_last);
     }
     out_.rotation[at(c)] = r;
-    if (disturbed_) t -= r * rest_off_[at(c)];
+    Mat3 map = r;
+    VolumeTarget volume;
+    double volume_rounding = 0;
+    if (const double share = setup_.step.volume_share; share > 0) {
+      volume = volume_target(to_mat3(a), cluster.moments, r);
+      const double sums = sum_rounds(terms) * u_, off = sums * size.norm() + kRotationRounds * u_ * a.norm();
+      volume_rounding = share * volume.rounding(off, sums, u_);
+      if (volume.is_open(off, sums, u_)) note_open(c);
+      map = volume.map(share, r);
+      if (disturbed_) {
+        Mat3 noise;
+        for (double& entry : noise.m) entry = share * kRotationRounds * u_ * volume.size * noise_();
+        const Mat3& root = volume.inverse_root;
+        for (int row = 0; row < 3; ++row) {
+          for (int column = 0; column < 3; ++column) {
+            for (int k = 0; k < 3; ++k) map(row, column) += noise(row, k) * root(k, column);
+          }
+        }
+      }
+    }
+    if (disturbed_) t -= map * rest_off_[at(c)];
     const double center_rounding = 4 * u_ * u_ * dot(center, center) + 3 * mean_amplitude * mean_amplitude;
     if (!disturbed_) {
       // A common error of all members moves their sum as a whole; a rest center is off in each iteration.
@@ -507,9 +529,11 @@ void StepModel::Run::match_shapes(int32_t s, int32_t j) {
           cluster.mass * cluster.mass * (center_rounding + setup_.step.iterations * rest_amplitude * rest_amplitude);
     }
     for (std::size_t k = 0; k < members.size(); ++k) {
-      sum_[at(members[k])] += t + r * arm[k];
+      sum_[at(members[k])] += t + map * arm[k];
       if (!disturbed_) {
-        goal_rounding_[at(members[k])] += center_rounding + out_.turn_rounding[at(c)] * dot(arm[k], arm[k]);
+        const double of_volume = volume_rounding > 0 ? volume_rounding * volume.lever(arm[k]) : 0;
+        goal_rounding_[at(members[k])] +=
+            center_rounding + out_.turn_rounding[at(c)] * dot(arm[k], arm[k]) + of_volume * of_volume;
       }
     }
   }

@@ -79,7 +79,8 @@ class StepModel {
     Vec3 rest;          // T
     double radius = 0;  // greatest |X - T|
     double arms = 0;    // Σ w |X - T|
-    Mat3 inverse;       // pseudoinverse of Σ w (X - T)(X - T)ᵀ
+    Mat3 moments;       // A0 = Σ w (X - T)(X - T)ᵀ
+    Mat3 inverse;       // its pseudoinverse
     enum class Extent { point, line, more } extent = Extent::more;
   };
 

@@ -20,7 +20,7 @@ struct StepScene {
 
 // A bent, spinning block on a floor with friction, held at one end, with a blade that presses its middle.
 inline StepScene pressed_block(Solver solver = Solver::implicit, Acceleration acceleration = Acceleration::none,
-                               double retardation = 0) {
+                               double retardation = 0, double volume_share = 0) {
   StepScene scene{setup_of(block_body(9, 5, 4, kSpacing, 0.002)), {}, {}};
   cutproof::Setup& setup = scene.setup;
   setup.step.solver = solver;
@@ -28,6 +28,7 @@ inline StepScene pressed_block(Solver solver = Solver::implicit, Acceleration ac
   setup.step.gravity = {1, -2, -9.81};
   setup.step.damping = 3;
   setup.step.retardation = retardation;
+  setup.step.volume_share = volume_share;
   setup.walls = {{.axis = 2, .side = +1, .offset = 0.0102, .friction = 0.4}};
   setup.grips = {{.particles = {0, 9, 18}, .active = {1, 1, 0, 1}, .displacement = {4, Vec3{0.001, 0, 0.0005}}}};
   setup.has_blade = true;

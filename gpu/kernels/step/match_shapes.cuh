@@ -2,8 +2,8 @@
 // particles (docs/design/method.md §3).
 //
 // All positions are displacements from rest, d = x - X. Then t_c - T_c = Σ w d / M. Particle i has its goal in cluster
-// c at X_i + (t_c - T_c) + (R_c - I)(X_i - T_c). So a body at rest, or moved as a whole, is reproduced exactly: all d
-// are equal, all moments about bases are zero, and R_c is I to the last bit.
+// c at X_i + (t_c - T_c) + (B_c - I)(X_i - T_c), with B_c = R_c unless it keeps volume. So a body at rest, or moved as
+// a whole, is reproduced exactly: all d are equal, all moments about bases are zero, and R_c is I to the last bit.
 #pragma once
 #include <cstddef>
 
@@ -12,6 +12,7 @@
 #include "gpu/kernels/step/iteration_numbers.cuh"
 #include "gpu/kernels/step/lists.cuh"
 #include "gpu/kernels/step/moments.cuh"
+#include "gpu/kernels/volume.cuh"
 #include "gpu/launch/launcher.h"
 #include "gpu/launch/team.h"
 #include "gpu/state/device_view.h"
@@ -126,7 +127,9 @@ struct ClusterRest {
   Start<float> start;
   float h, per_mass, per_mass_and_h;
   int size;
+  float volume_share;  // where clusters keep their volume
 };
+template <bool kVolume>
 CUTPROOF_DEVICE inline ClusterRest rest_of_cluster(const DeviceView& w, int s) {
   const Float4* const row = w.cluster_rest + 3 * int64_t{s};
   ClusterRest rest = {};
@@ -136,10 +139,12 @@ CUTPROOF_DEVICE inline ClusterRest rest_of_cluster(const DeviceView& w, int s) {
   rest.per_mass = 1.0f / rest.row[0].w;
   rest.per_mass_and_h = 1.0f / (rest.row[0].w * rest.h);
   rest.size = w.slot_size[s];
+  if constexpr (kVolume) rest.volume_share = w.body[w.slot_body[s]].volume_share;
   return rest;
 }
 
-// Stores centre and rotation of a cluster, which follow from its sums.
+// Stores centre, rotation and map of a cluster, which follow from its sums.
+template <bool kVolume>
 CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const ClusterRest& rest,
                                           const ClusterSums& sums) {
   const float* const moment = sums.moments.v;
@@ -149,9 +154,11 @@ CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const Clus
   // A = Σ w (x - t)(X - T)ᵀ / h². The rest moment is the rounding of T.
   const Float3 shift = rest.per_mass_and_h * moved;
   Matrix3 a;
+  [[maybe_unused]] Matrix3 change;  // A - A0
   for (int row = 0; row < 3; ++row) {
     for (int k = 0; k < 3; ++k) {
-      a(row, k) = spread[3 * row + k] + (moment[4 * row + k] - shift[row] * rest_moment[k]);
+      change(row, k) = moment[4 * row + k] - shift[row] * rest_moment[k];
+      a(row, k) = spread[3 * row + k] + change(row, k);
     }
   }
   // One particle has no extent: A is only rounding, and rotate() would make a rotation of it.
@@ -159,11 +166,20 @@ CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const Clus
   const Rotation<float> best = rest.size > 1 ? rotate(a, previous, rest.start) : Rotation<float>{previous, true};
   // The centre makes Σ w (goal) equal Σ w x to the rounding of these two sums: the rounded T must not push the
   // cluster (docs/design/decisions.md, Momentum and the rounding of sums).
-  const Float3 turned = best.r * rest_moment - rest_moment;
+  Float3 turned = best.r * rest_moment - rest_moment;
+  Matrix3 map;  // B - I
+  for (int k = 0; k < 9; ++k) map.m[k] = best.r.m[k] - (k % 4 == 0 ? 1.0f : 0.0f);
+  if constexpr (kVolume) {
+    if (rest.volume_share > 0) {
+      const float a0[3][3] = {
+          {spread[0], spread[1], spread[2]}, {spread[3], spread[4], spread[5]}, {spread[6], spread[7], spread[8]}};
+      map = goal_map(rest.volume_share, a0, change, best.r);
+      turned = map * rest_moment;
+    }
+  }
   const Float3 center = sums.base + rest.per_mass * (moved - rest.h * turned);
   for (int axis = 0; axis < 3; ++axis) {
-    const auto entry = [&](int k) { return best.r(axis, k) - (k == axis ? 1.0f : 0.0f); };
-    w.placement[3 * int64_t{s} + axis] = {entry(0), entry(1), entry(2), center[axis]};
+    w.placement[3 * int64_t{s} + axis] = {map(axis, 0), map(axis, 1), map(axis, 2), center[axis]};
   }
   w.rotation[s] = best.r;
   w.degenerate[s] = best.degenerate;
@@ -174,7 +190,7 @@ CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const Clus
 // Places all clusters. On the device the teams of a block sum. In a load of many clusters each team sums several, and
 // neighbouring threads then compute their rotations side by side. In a load of few the first thread of each team
 // computes one, without waiting for other teams.
-template <int kLanes, class Block>
+template <int kLanes, bool kVolume, class Block>
 CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int substep, int iteration) {
   using namespace step_detail;
   const Team<Block, kLanes> team(block);
@@ -211,7 +227,7 @@ CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int 
         if (turn == 0) {
           places = apart ? sums && team.leads() : which < turns * kTeams && wanted(placed, ignored);
           // (Where few threads place many clusters, it would take registers from all threads that sum.)
-          if (apart && places) rest = rest_of_cluster(w, placed);
+          if (apart && places) rest = rest_of_cluster<kVolume>(w, placed);
         }
         block.wait_for_earlier();
         if (!sums) continue;
@@ -219,8 +235,8 @@ CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int 
         sum_cluster(team, w, summed, ahead, all[turn * kTeams + mine]);
       }
       apart ? team.sync() : block.sync();
-      if (!apart && places) rest = rest_of_cluster(w, placed);
-      if (places) place_cluster(w, placed, rest, all[which]);
+      if (!apart && places) rest = rest_of_cluster<kVolume>(w, placed);
+      if (places) place_cluster<kVolume>(w, placed, rest, all[which]);
       apart ? team.sync() : block.sync();
     }
   } else {
@@ -232,7 +248,7 @@ CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int 
       ahead.read_bases(team, w);
       ClusterSums sums;
       sum_cluster(team, w, s, ahead, sums);
-      place_cluster(w, s, rest_of_cluster(w, s), sums);
+      place_cluster<kVolume>(w, s, rest_of_cluster<kVolume>(w, s), sums);
     }
   }
   block.wait_for_earlier();
@@ -242,14 +258,14 @@ CUTPROOF_DEVICE void match_shapes_kernel(Block& block, const DeviceView& w, int 
   }
 }
 
-template <int kLanes>
+template <int kLanes, bool kVolume>
 struct match_shapes_kernel_object {
   static constexpr const char* kName = "match_shapes_kernel";
   static constexpr bool kReadsAhead = true;
   static constexpr int kMaxThreads = step_detail::kMatchThreads, kMinBlocks = 4;
   template <class Block>
   CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, int substep, int iteration) const {
-    match_shapes_kernel<kLanes>(block, w, substep, iteration);
+    match_shapes_kernel<kLanes, kVolume>(block, w, substep, iteration);
   }
 };
 

@@ -13,6 +13,7 @@
 #pragma once
 #include <type_traits>
 
+#include "gpu/kernels/carried_tissue.cuh"
 #include "gpu/kernels/frame.cuh"
 #include "gpu/kernels/step/bodies.cuh"
 #include "gpu/kernels/step/carried.cuh"
@@ -284,8 +285,11 @@ void enqueue(Launcher& launcher, const DeviceView& w, const Plan& plan, Span spa
     for (int iteration = 0; iteration < plan.iterations; ++iteration) {
       by_clusters([&](auto lanes) {
         constexpr int kTeams = kMatchThreads / lanes.value;
-        launcher.blocks(match_shapes_kernel_object<lanes.value>{}, (w.slots_expected + kTeams - 1) / kTeams,
-                        kMatchThreads, kMatchShared<lanes.value>, w, substep, iteration);
+        by_volume(w.keeps_volume != 0, [&](auto volume) {
+          launcher.blocks(match_shapes_kernel_object<lanes.value, volume.value>{},
+                          (w.slots_expected + kTeams - 1) / kTeams, kMatchThreads, kMatchShared<lanes.value>, w,
+                          substep, iteration);
+        });
       });
       by_rows([&](auto rows) {
         launcher.teams(advance_kernel_object<kContacts, kAccelerated, kRetarded, rows.value>{}, kParticleTeam, teams, w,
