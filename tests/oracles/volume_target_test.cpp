@@ -106,6 +106,14 @@ TEST(VolumeTarget, IsOpenWhereTheAnswerJumps) {
     const VolumeTarget target = volume_target(to_mat3(Matrix(sigma.asDiagonal())), one, one);
     EXPECT_FALSE(target.is_open(u, u, u)) << sigma.transpose();
   }
+  // Where the nearest one jumps, both branches are as near: an error of A may decide.
+  const auto dilated = [&](double by) { return volume_target(to_mat3(Matrix(by * Matrix::Identity())), one, one); };
+  double jump = 1.89;
+  for (double by = jump; by < 1.95; by += 1e-4) {
+    if (dilated(by).lead < dilated(jump).lead) jump = by;
+  }
+  EXPECT_TRUE(dilated(jump).is_open(2e-4, u, u)) << jump;
+  EXPECT_FALSE(dilated(1.8).is_open(2e-4, u, u));
   // Nearly flat: the threshold of det A0, and a moment at that of the greatest.
   const double flat = kFlatVolume * std::pow(2, 3);
   for (const double least : {flat, 1e-3}) {

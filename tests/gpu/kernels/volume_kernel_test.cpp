@@ -132,15 +132,17 @@ TEST(VolumeKernel, IsFiniteAndNearestWhereverTheClusterIs) {
   Draw draw(4);
   for (int k = 0; k < 20'000; ++k) {
     Eigen::Vector3d sigma(1, 1, 1);
-    const int kind = k % 6;
+    const int kind = k % 7;
     if (kind == 0) sigma[2] = 0;
     if (kind == 1) sigma = {1, 0, 0};
     if (kind == 2) sigma = {0, 0, 0};
     if (kind == 3) sigma = {1, 0.5, -0.5};
     if (kind == 4) sigma = {-1, -1, -1};
     if (kind == 5) sigma *= 3;
+    if (kind == 6) sigma *= 1.97;  // both roots exist, and the lesser is nearer
     const Matrix f = draw.turn() * sigma.asDiagonal() * draw.turn();
-    const Problem problem = problem_of(f, {1, 1.5, 2}, draw.turn(), draw.turn());
+    const Eigen::Vector3d extent = kind == 6 ? Eigen::Vector3d(1, 1, 1) : Eigen::Vector3d(1, 1.5, 2);
+    const Problem problem = problem_of(f, extent, draw.turn(), draw.turn());
     const Matrix v = answer(problem), w = expected(problem);
     ASSERT_TRUE(v.allFinite());
     const double size = size_of(w, problem) + size_of(problem.f, problem);
