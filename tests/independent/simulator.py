@@ -14,7 +14,7 @@ DEFAULTS = {  # §14
     "body": {"density": 1000, "fit_skin": True, "align": True},
     "clusters": {"method": "boxes", "side": 5, "spacing": 3.0, "radius": 4.0, "small": 0.5, "cap": 1.4},
     "frame": {"length": 0.016, "count": 0, "settle": 0},
-    "step": {"solver": "implicit", "substeps": 4, "iterations": 4, "stiffness": 1e5, "relaxation": 0.5, "damping": 0,
+    "step": {"solver": "implicit", "substeps": 4, "iterations": 4, "stiffness": 1e5, "volume_share": 0, "relaxation": 0.5, "damping": 0,
              "retardation": 0, "gravity": (0, 0, 0)},
     "detect": {"criterion": "distance", "epsilon": 1.5, "strain": 1.2, "without_blade": False, "every": "frame"},
     "split": {"debris": 0},
@@ -625,6 +625,41 @@ class Contacts:
         return found
 
 
+def nearest_product(sigma, product):
+    """M3.16: p, by all sign changes of p_1 p_2 p_3 - product over p_3."""
+    def p_of(p3):
+        mu = p3 * (p3 - sigma[2])
+        return np.array([(s + np.sqrt(np.maximum(s * s + 4 * mu, 0))) / 2 for s in sigma[:2]] + [p3])
+    grid = np.geomspace(1e-9, 3, 2000) * max(abs(sigma).max(), product ** (1 / 3))
+    above = p_of(grid).prod(axis=0) > product
+    found = []
+    for k in np.nonzero(above[1:] != above[:-1])[0]:
+        low, high = grid[k], grid[k + 1]
+        for _ in range(60):
+            middle = (low + high) / 2
+            low, high = (middle, high) if (p_of(middle).prod() > product) == above[k] else (low, middle)
+        found.append(p_of(low))
+    return min(reversed(found), key=lambda p: np.linalg.norm(p - sigma))
+
+
+def volume(A, A0, R):
+    """M3.16, M3.17."""
+    if not np.isfinite(A).all():
+        return R
+    extents, axes = np.linalg.eigh(A0)
+    if np.linalg.det(A0) > (np.trace(A0) / 15) ** 3:
+        inverse_root = axes / np.sqrt(extents) @ axes.T
+        U, sigma, Zt = np.linalg.svd(A @ inverse_root)
+        for turn in (U.T, Zt):  # make it a rotation
+            if np.linalg.det(turn) < 0:
+                turn[2] *= -1
+                sigma[2] *= -1
+        return U * nearest_product(sigma, np.sqrt(extents.prod())) @ Zt @ inverse_root
+    along = axes[:, extents > 1e-3 * extents.max()]
+    inverse = along / extents[extents > 1e-3 * extents.max()] @ along.T
+    return A @ inverse + R @ (np.eye(3) - along @ along.T)
+
+
 # ------------------------------------------------------------------------------------------------ the stages
 
 class Cover:
@@ -643,6 +678,8 @@ class Cover:
         self.r = body.rest[self.i] - self.T[self.c]
         self.R = np.array([c.rotation for c in clusters])
         self.offset = np.add.reduceat(self.w[:, None] * self.r, self.starts)  # 0 but for rounding
+        self.A0 = np.add.reduceat(self.w[:, None, None] * self.r[:, :, None] * self.r[:, None, :], self.starts)
+        self.A0[np.array(sizes) == 1] = 0  # M3.17
         self.body = body
 
     def mean(self, y):
@@ -653,15 +690,22 @@ class Cover:
     def moments(self, y, t):
         return np.add.reduceat((self.w[:, None] * (y[self.i] - t[self.c]))[:, :, None] * self.r[:, None, :], self.starts)
 
-    def exact_mean(self, y, t):
+    def maps(self, beta, y, t):
+        """M3.15: B."""
+        if beta == 0:
+            return self.R
+        V = np.array([volume(A, A0, R) for A, A0, R in zip(self.moments(y, t), self.A0, self.R)])
+        return (1 - beta) * self.R + beta * V
+
+    def exact_mean(self, y, t, B):
         """M3.5, last sentence."""
         error = np.add.reduceat(self.w[:, None] * (y[self.i] - t[self.c]), self.starts)
-        return t + (error - np.einsum("cij,cj->ci", self.R, self.offset)) / self.M[:, None]
+        return t + (error - np.einsum("cij,cj->ci", B, self.offset)) / self.M[:, None]
 
-    def carried(self, t, otherwise, shift=None):
+    def carried(self, t, B, otherwise, shift=None):
         """The mean place where its clusters carry each particle, shifted by `shift` at rest."""
         r = self.r if shift is None else self.r + shift[self.i]
-        place = t[self.c] + np.einsum("pij,pj->pi", self.R[self.c], r)
+        place = t[self.c] + np.einsum("pij,pj->pi", B[self.c], r)
         total = np.stack([np.bincount(self.i, place[:, k], len(self.n)) for k in range(3)], axis=1)
         return np.where((self.n > 0)[:, None], total / np.maximum(self.n, 1)[:, None], otherwise)
 
@@ -842,7 +886,8 @@ class Simulator:
         for j in range(o["iterations"]):
             t = cover.mean(y)
             cover.R, self.flags, self.gap = rotations(cover.moments(y, t), cover.R)
-            g = cover.carried(cover.exact_mean(y, t), y)
+            B = cover.maps(o["volume_share"], y, t)
+            g = cover.carried(cover.exact_mean(y, t, B), B, y)
             p = y + s * (g - y) if published else guess_ahead + s * (g - guess_ahead)
             combined = lambda new, now, last: new
             if o["acceleration"] == "chebyshev" and j > 0:
@@ -891,7 +936,7 @@ class Simulator:
         count = np.bincount(edges.ravel(), minlength=n)
         height = np.zeros(n) if self.plane is None else self.height(self.x)
         if self.plane is not None and o["remove"] == "nearer":
-            carried = abs(self.height(self.cover.carried(self.cover.mean(self.x), self.x)))
+            carried = abs(self.height(self.cover.carried(*self.places(), self.x)))
         for i, j in edges.tolist():  # i < j
             if (height[i] < 0) != (height[j] < 0):
                 low, high = (i, j) if height[i] < 0 else (j, i)
@@ -959,14 +1004,19 @@ class Simulator:
 
     # ------------------------------------------------------------------------------------------------------- skin
 
+    def places(self):
+        """t_c and B_c of M4.2."""
+        t = self.cover.mean(self.x)
+        return t, self.cover.maps(self.scene["step"]["volume_share"], self.x, t)
+
     def skin_positions(self, owner, direction, reach):
         """M8.1."""
-        t, place = self.cover.mean(self.x), np.empty((len(owner), 3))
+        (t, B), place = self.places(), np.empty((len(owner), 3))
         for d in range(6):
             shift = np.zeros((self.body.count, 3))
             which = direction == d
             shift[owner[which]] = (reach[which] * self.body.h)[:, None] * DIRECTIONS[d]
-            place[which] = self.cover.carried(t, self.x + shift, shift)[owner[which]]
+            place[which] = self.cover.carried(t, B, self.x + shift, shift)[owner[which]]
         return place
 
     def make_skin(self):
