@@ -121,6 +121,7 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
         a0 += weighted.weight[at(i)] * arm * arm.transpose();
         size += now.norm() * arm.norm();
       }
+      if (members.size() == 1) a0.setZero();  // it was the rounding of its centre
       volumes.push_back(volume_target(to_mat3(a), to_mat3(a0), maps[at(c)]));
       const double sums = sum_rounds(static_cast<double>(members.size())) * u;
       const double places = u * spread * std::sqrt(a0.trace() * means[at(c)].mass);

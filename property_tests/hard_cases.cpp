@@ -358,33 +358,40 @@ TEST_P(HardCases, InvertedAndFlattenedBodiesComeBackToTheirShape) {
   } const cases[] = {{"mirrored", {1, 1, -1}},           {"inverted", {-1, -1, -1}}, {"flattened", {1, 1, 0}},
                      {"nearly flattened", {1, 1, 1e-9}}, {"a line", {1, 0, 0}},      {"a point", {0, 0, 0}}};
   for (const auto& [name, factor] : cases) {
-    SCOPED_TRACE(name);
-    const Case c = moving(block(4, 4, 4), 2, 2, 6);  // one cluster: several may hold each other in a twisted minimum
-    Instance loaded = undisturbed(c, 40, 0.004);
-    ASSERT_EQ(loaded.state.clusters.count(), 1);
-    loaded.setup.step.damping = 20;
-    const Vec3 center = loaded.state.clusters.rest_center.front();
-    for (Vec3& x : loaded.state.x) {
-      for (int axis = 0; axis < 3; ++axis) x[axis] = center[axis] + factor[axis] * (x[axis] - center[axis]);
+    for (const double volume_share : {0.0, 0.9}) {
+      SCOPED_TRACE(testing::Message() << name << ", volume share " << volume_share);
+      const Case c = moving(block(4, 4, 4), 2, 2, 6);  // one cluster: several may hold each other in a twisted minimum
+      Instance loaded = undisturbed(c, 40, 0.004);
+      ASSERT_EQ(loaded.state.clusters.count(), 1);
+      loaded.setup.step.damping = 20;
+      loaded.setup.step.volume_share = volume_share;
+      const Vec3 center = loaded.state.clusters.rest_center.front();
+      for (Vec3& x : loaded.state.x) {
+        for (int axis = 0; axis < 3; ++axis) x[axis] = center[axis] + factor[axis] * (x[axis] - center[axis]);
+      }
+      const Outcome outcome = run(c, loaded, false);
+      for (const harness::Moment& moment : outcome.run.trace.moments) {
+        const State& state = *moment.after;
+        ASSERT_TRUE(std::all_of(state.x.begin(), state.x.end(), is_finite));
+      }
+      EXPECT_LT(greatest_strain(outcome.setup, outcome.last()), 1e-2);
+      EXPECT_NEAR(determinant(outcome.last().clusters.rotation.front()), 1, 1e-5) << "a rotation, never a reflection";
     }
-    const Outcome outcome = run(c, loaded, false);
-    for (const harness::Moment& moment : outcome.run.trace.moments) {
-      const State& state = *moment.after;
-      ASSERT_TRUE(std::all_of(state.x.begin(), state.x.end(), is_finite));
-    }
-    EXPECT_LT(greatest_strain(outcome.setup, outcome.last()), 1e-2);
-    EXPECT_NEAR(determinant(outcome.last().clusters.rotation.front()), 1, 1e-5) << "a rotation, never a reflection";
   }
 }
 
 TEST_P(HardCases, SeveralInvertedClustersStayFiniteAndTheirRotationsRotations) {
   Case c = moving(block(6, 4, 4), 2, 2, 6);
   c.side = 3;
-  for (const double factor : {-1.0, 0.0, 1e-9}) {
-    Instance loaded = undisturbed(c, 20, 0.004);
-    ASSERT_GT(loaded.state.clusters.count(), 1);
-    for (Vec3& x : loaded.state.x) x.z = 2.5 + factor * (x.z - 2.5);
-    run(c, loaded, false);  // finite, rotation, momentum: after every step
+  for (const double factor : {-1.0, 0.0, 1e-9, 3.0}) {
+    for (const double volume_share : {0.0, 0.9}) {
+      SCOPED_TRACE(testing::Message() << factor << ", volume share " << volume_share);
+      Instance loaded = undisturbed(c, 20, 0.004);
+      ASSERT_GT(loaded.state.clusters.count(), 1);
+      loaded.setup.step.volume_share = volume_share;
+      for (Vec3& x : loaded.state.x) x.z = 2.5 + factor * (x.z - 2.5);
+      run(c, loaded, false);  // finite, rotation, momentum: after every step
+    }
   }
 }
 
@@ -435,14 +442,17 @@ TEST_P(HardCases, StepsFromAMicrosecondToATenthOfASecondFallFreelyAndGainNoEnerg
       for (int axis = 0; axis < 3; ++axis) x[axis] += random.real(-0.3, 0.3);
     }
     loaded.setup.step.gravity = {};
-    run(c, loaded, false);
-    for (const Verdict& verdict :
-         {oracles::energy_is_monotone(*backend_, loaded.setup, loaded.state, 6),
-          oracles::rest_is_fixed(*backend_, loaded.setup, loaded.state),
-          oracles::translation_is_exact(*backend_, loaded.setup, loaded.state, {0.3, -0.2, 0.1}),
-          oracles::determinism(*backend_, loaded.setup, loaded.state, 2)}) {
-      EXPECT_TRUE(verdict.holds) << describe(verdict);
-      EXPECT_GT(verdict.checked, 0) << verdict.property;
+    for (const double volume_share : {0.0, 0.9}) {
+      loaded.setup.step.volume_share = volume_share;
+      run(c, loaded, false);
+      for (const Verdict& verdict :
+           {oracles::energy_is_monotone(*backend_, loaded.setup, loaded.state, 6),
+            oracles::rest_is_fixed(*backend_, loaded.setup, loaded.state),
+            oracles::translation_is_exact(*backend_, loaded.setup, loaded.state, {0.3, -0.2, 0.1}),
+            oracles::determinism(*backend_, loaded.setup, loaded.state, 2)}) {
+        EXPECT_TRUE(verdict.holds) << describe(verdict);
+        EXPECT_GT(verdict.checked, 0) << verdict.property;
+      }
     }
   }
 }

@@ -33,6 +33,7 @@ inline std::vector<Mat3> current_maps(const Setup& setup, const State& state, co
   std::vector<Mat3> maps = state.clusters.rotation;
   if (setup.step.volume_share == 0) return maps;
   for (int32_t c = 0; c < state.clusters.count(); ++c) {
+    if (state.clusters.size(c) == 1) continue;  // A0 would be the rounding of T
     Mat3 a, a0;
     a.m.fill(0);
     a0.m.fill(0);

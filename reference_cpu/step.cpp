@@ -110,7 +110,8 @@ std::vector<Pose> match_shapes(const Body& body, double volume_share, const Memb
       }
     }
     const Rotation best = closest_rotation(a, clusters.rotation[at(c)]);
-    pose.map = goal_map(volume_share, a, a0, best.r);
+    // Of one particle A0 is the rounding of T.
+    pose.map = clusters.size(c) > 1 ? goal_map(volume_share, a, a0, best.r) : best.r;
     // Otherwise it would push the cluster, and change the body's momentum, in every iteration.
     pose.center += (moment - pose.map * rest_moment) / clusters.mass[at(c)];
     clusters.rotation[at(c)] = best.r;

@@ -83,7 +83,7 @@ CUTPROOF_DEVICE void recenter(const DeviceView& w, const Team<Block, kCenterTeam
     if (!team.leads()) return;
     Matrix3 map = w.rotation[s];
     turned = map * rest - rest;
-    if (body.volume_share > 0) {
+    if (body.volume_share > 0 && w.slot_size[s] > 1) {  // of one particle A0 is rounding
       const float per_h = 1.0f / body.h;
       const float a0[3][3] = {
           {of.v[9], of.v[10], of.v[11]}, {of.v[10], of.v[12], of.v[13]}, {of.v[11], of.v[13], of.v[14]}};

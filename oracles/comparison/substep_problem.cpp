@@ -118,6 +118,7 @@ SubstepProblem::SubstepProblem(const Setup& setup, const State& state)
       offset.push_back(rest.position[at(i)] - center);
       of_cluster += rest.weight[at(i)] * as_eigen(offset.back()) * as_eigen(offset.back()).transpose();
     }
+    if (clusters.size(c) == 1) of_cluster.setZero();  // it was the rounding of its centre
     moments.push_back(to_mat3(of_cluster));
   }
 }

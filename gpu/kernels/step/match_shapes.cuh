@@ -170,7 +170,7 @@ CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const Clus
   Matrix3 map;  // B - I
   for (int k = 0; k < 9; ++k) map.m[k] = best.r.m[k] - (k % 4 == 0 ? 1.0f : 0.0f);
   if constexpr (kVolume) {
-    if (rest.volume_share > 0) {
+    if (rest.volume_share > 0 && rest.size > 1) {
       const float a0[3][3] = {
           {spread[0], spread[1], spread[2]}, {spread[3], spread[4], spread[5]}, {spread[6], spread[7], spread[8]}};
       map = goal_map(rest.volume_share, a0, change, best.r);
