@@ -16,7 +16,9 @@
 #include "cli/reference_pages.h"
 #include "cli/scene_files.h"
 #include "cli/screen.h"
+#include "fixtures/build.h"
 #include "fixtures/import/mesh.h"
+#include "fixtures/material.h"
 #include "guests/questions/vectors.h"
 #include "harness/promises.h"
 #include "model/error.h"
@@ -32,11 +34,12 @@ namespace cutproof::cli {
 namespace {
 
 struct InfoOptions {
-  bool scene = false;   // print the reference of scene files
-  bool schema = false;  // print the JSON Schema of scene files
-  bool scenes = false;  // print the scenes that come with the program
-  bool limits = false;  // print how much is read
-  std::string mesh;     // examine it
+  bool scene = false;    // print the reference of scene files
+  bool schema = false;   // print the JSON Schema of scene files
+  bool scenes = false;   // print the scenes that come with the program
+  bool limits = false;   // print how much is read
+  std::string material;  // print that of this scene
+  std::string mesh;      // examine it
   std::string unit = "mm";
   std::string json;
   bool man = false;        // print the manual page
@@ -86,6 +89,25 @@ int print_scene_names() {
   return 0;
 }
 
+int print_material(const std::string& scene_name) {
+  const std::string file = scene_file(scene_name);
+  const Scene scene = io::read_scene(file);
+  if (scene.step.solver != Solver::implicit) {
+    throw InputError(file, "step.solver", "The solver \"published\" has no elastic modulus.",
+                     "Choose \"solver\": \"implicit\".");
+  }
+  const fixtures::Built built = fixtures::build(scene, file);
+  const fixtures::Cover cover = fixtures::measure_cover(built.setup.body, built.state.clusters, scene.clusters);
+  const StepParameters& step = built.setup.step;
+  const double dt =
+      built.setup.substep_length.empty() ? scene.frame_length / step.substeps : built.setup.substep_length.front();
+  for (const std::string& sentence :
+       fixtures::sentences_of(fixtures::material_of(step, cover, scene.body.density), step, dt)) {
+    insist("{}\n", io::hanging(sentence, 2));
+  }
+  return 0;
+}
+
 int examine(const InfoOptions& options) {
   const double unit = metres_per(options.unit);
   require_writable(options.json);
@@ -122,6 +144,7 @@ std::string date_of_build() {
 
 int info(const InfoOptions& options, const CLI::App& program) {
   if (options.scenes) return print_scene_names();
+  if (!options.material.empty()) return print_material(options.material);
   if (!options.mesh.empty()) return examine(options);
   if (options.scene) {
     insist_text(io::scene_reference());
@@ -169,6 +192,10 @@ void add_info(CLI::App& program, Work& work) {
   command->add_flag("--scene", options->scene, "list every field of a scene file");
   command->add_flag("--schema", options->schema, "print the JSON Schema of scene files, for editors");
   command->add_flag("--scenes", options->scenes, "list the scenes that come with the program");
+  command
+      ->add_option("--material", options->material,
+                   "print Young's modulus and Poisson's ratio of a scene, and what its iterations make of them")
+      ->type_name("SCENE");
   CLI::Option* const mesh = command
                                 ->add_option("--mesh", options->mesh,
                                              "examine a surface mesh: defects, size, volume and effect of --repair; "

@@ -52,6 +52,14 @@ struct BodySpec {
   friend bool operator==(const BodySpec&, const BodySpec&) = default;
 };
 
+// An isotropic material. The body's density, and the step's stiffness and volume share, follow from it.
+struct MaterialSpec {
+  double youngs_modulus = 0;  // E [Pa], > 0
+  double poisson_ratio = 0;   // ν
+  double density = 0;         // [kg/m³], > 0
+  friend bool operator==(const MaterialSpec&, const MaterialSpec&) = default;
+};
+
 enum class Cooking { boxes, sampled };
 struct ClusterSpec {
   Cooking method = Cooking::boxes;
@@ -135,6 +143,7 @@ struct Scene {
   std::string description;
   uint64_t seed = 1;
   BodySpec body;
+  std::optional<MaterialSpec> material;  // in place of body.density, step.stiffness and step.volume_share
   ClusterSpec clusters;
   double frame_length = 0.016;  // [s]
   int64_t frames = 0;           // 0: until the last stroke ends and `settle` is over

@@ -23,8 +23,8 @@ constexpr double kSeen = 1e-9;
 
 // Iterations that shrink every error of a substep to kLeft: with rotations held, each multiplies it by at most
 // s (method.md §3).
-int32_t enough_iterations(const Scene& scene, int32_t substeps) {
-  const double dt = scene.frame_length / substeps, kdt2 = scene.step.stiffness * dt * (dt + scene.step.retardation);
+int32_t enough_iterations(const StepParameters& step, double frame_length, int32_t substeps) {
+  const double dt = frame_length / substeps, kdt2 = step.stiffness * dt * (dt + step.retardation);
   const double s = kdt2 / (1 + kdt2);
   if (s < kLeft) return 2;
   const double iterations = std::ceil(std::log(kLeft) / std::log(s));
@@ -113,7 +113,7 @@ RefinementLevel ReferenceSolution::level_after(const RefinementLevel* before) co
         before == nullptr ? std::max(kLeastIterations, scene_.step.iterations) : 2 * before->iterations.value();
   } else {
     level.substeps = before == nullptr ? std::max(kLeastSubsteps, 4 * scene_.step.substeps) : 2 * before->substeps;
-    level.iterations = enough_iterations(scene_, level.substeps);
+    level.iterations = enough_iterations(setup_.step, scene_.frame_length, level.substeps);
   }
   return level;
 }

@@ -151,6 +151,12 @@ void describe(auto& v, BodySpec& s) {
                      between(-1e12, 1e12, "m")});
 }
 
+void describe(auto& v, MaterialSpec& s) {
+  v.field(s.youngs_modulus, {"youngs_modulus", "E.", above(0, 1e15, "Pa"), kRequired});
+  v.field(s.poisson_ratio, {"poisson_ratio", "ν.", between(0, 0.49), kRequired});
+  v.field(s.density, {"density", "ρ.", above(0, 1e9, "kg/m³"), kRequired});
+}
+
 void describe(auto& v, ClusterSpec& s) {
   v.field(s.method, {"method",
                      "`boxes`: cores tile the grid and grow by one node, so that every edge is covered. `sampled`: "
@@ -175,10 +181,9 @@ void describe(auto& v, StepParameters& s) {
   v.field(s.stiffness,
           {"stiffness", "k, stiffness per mass; `implicit` only, with κ = k dt (dt + τ) and s = κ / (1 + κ).",
            between(0, 1e15, "1/s²")});
-  v.field(s.volume_share, {"volume_share",
-                           "β, the share of k that keeps the volume of each cluster: more of it, a greater Poisson "
-                           "ratio (method.md §3). `implicit` only.",
-                           between(0, 0.999)});
+  v.field(s.volume_share,
+          {"volume_share", "β, the share of k that keeps volume (method.md §3, Volume). `implicit` only.",
+           between(0, 0.999)});
   v.field(s.relaxation, {"relaxation", "s; `published` only.", above(0, 1)});
   v.field(s.acceleration, {"acceleration",
                            "`chebyshev`: the same answer in fewer, slightly dearer iterations; the energy may rise in "
@@ -352,6 +357,9 @@ void describe(auto& v, Scene& s) {
           {"description", "Description of the scene, for readers.", {}, kOptional, kMostDescriptionBytes});
   v.field(s.seed, {"seed", "Seed of all random numbers.", between(0, 18446744073709551615.0)});
   v.field(s.body, {"body", "The tissue that is cut.", {}, kRequired});
+  v.field(s.material, {"material",
+                       "An isotropic material (method.md §3, Volume), in place of `body.density`, `step.stiffness` and "
+                       "`step.volume_share`; `implicit` only."});
   v.field(s.clusters, {"clusters", "Covering of the body with clusters."});
   FrameFields frame{s.frame_length, s.frames, s.settle};
   v.field(frame, {"frame", "Division of time."});

@@ -384,6 +384,23 @@ RemovedEnds default_remove(const json& tree) {
   return by_distance ? RemovedEnds::nearer : RemovedEnds::both;
 }
 
+// What follows from a material is not given beside it.
+void check_material(const json& tree, const Place& at, Scene& scene) {
+  if (!scene.material) return;
+  for (const auto& [group, name] : {std::pair{"body", "density"}, {"step", "stiffness"}, {"step", "volume_share"}}) {
+    const auto found = tree.find(group);
+    if (found == tree.end() || !found->contains(name)) continue;
+    at.inner(group).inner(name).fail("The scene has a \"material\", from which this follows.",
+                                     "Leave out this field, or \"material\".");
+  }
+  if (scene.step.solver == Solver::published) {
+    at.inner("material")
+        .fail("The solver \"published\" has no elastic modulus.",
+              "Choose \"solver\": \"implicit\", or leave \"material\" out.");
+  }
+  scene.body.density = scene.material->density;
+}
+
 }  // namespace
 
 Scene parse_scene(const std::string& text, const std::string& name, const std::vector<SceneChange>& changes) {
@@ -395,7 +412,9 @@ Scene parse_scene(const std::string& text, const std::string& name, const std::v
   Scene scene;
   scene.step.acceleration = default_acceleration(tree);
   scene.detect.remove = default_remove(tree);
-  read(tree, Place{name, "", changes}, SceneField{}, scene);
+  const Place at = {name, "", changes};
+  read(tree, at, SceneField{}, scene);
+  check_material(tree, at, scene);
   return scene;
 }
 

@@ -55,6 +55,13 @@ void add_conditions(const StepParameters&, ordered_json& schema) {
                                   {"retardation", {{"const", 0}}},
                                   {"volume_share", {{"const", 0}}}};
 }
+void add_conditions(const Scene&, ordered_json& schema) {
+  schema["if"]["required"] = {"material"};
+  ordered_json& excluded = schema["then"]["properties"];
+  excluded["body"]["properties"]["density"] = false;
+  excluded["step"]["properties"] = {{"stiffness", false}, {"volume_share", false}};
+  excluded["step"]["properties"]["solver"]["const"] = name_of(Solver::implicit);
+}
 void add_conditions(const DetectFields&, ordered_json& schema) {
   schema["if"] = field_is("criterion", {{"not", {{"const", name_of(Criterion::distance)}}}});
   schema["then"]["properties"] = {{"remove", {{"const", name_of(RemovedEnds::both)}}}};

@@ -232,7 +232,15 @@ frames becomes `step.substeps` frames of one substep.
 
 }  // namespace
 
-std::string write_scene(const Scene& scene) { return pretty(written(scene), 0) + "\n"; }
+std::string write_scene(const Scene& scene) {
+  ordered_json tree = written(scene);
+  if (scene.material) {  // these follow from it
+    tree["body"].erase("density");
+    tree["step"].erase("stiffness");
+    tree["step"].erase("volume_share");
+  }
+  return pretty(tree, 0) + "\n";
+}
 
 std::string scene_reference() {
   Scene scene;

@@ -96,7 +96,8 @@ class Scrambler {
   }
   template <class T>
   void change(const SceneField& f, std::optional<T>& value) {
-    if (f.name == "ground" || f.name == "mesh") return;  // another way to give walls; excludes the shape
+    // Other ways to give walls, shape, and stiffness.
+    if (f.name == "ground" || f.name == "mesh" || f.name == "material") return;
     change(f, value.emplace());
   }
   template <class T>
@@ -403,6 +404,31 @@ TEST(SceneIo, VolumeShareIsForTheImplicitSolver) {
   expect_error(tree, "step.volume_share", {"published", "implicit", "leave"});
   tree["step"]["volume_share"] = 0;
   EXPECT_EQ(parse_scene(tree.dump(), "scene.json").step.solver, Solver::published);
+}
+
+TEST(SceneIo, AMaterialIsGivenInPlaceOfWhatFollowsFromIt) {
+  json tree = json::parse(kSmallest);
+  tree["material"] = {{"youngs_modulus", 1e4}, {"poisson_ratio", 0.45}, {"density", 1060}};
+  const Scene scene = parse_scene(tree.dump(), "scene.json");
+  ASSERT_TRUE(scene.material);
+  EXPECT_EQ(scene.material->poisson_ratio, 0.45);
+  EXPECT_EQ(scene.body.density, 1060);
+  EXPECT_EQ(parse_scene(write_scene(scene), "scene.json"), scene);
+  for (const auto& [group, name] : {std::pair{"body", "density"}, {"step", "stiffness"}, {"step", "volume_share"}}) {
+    json both = tree;
+    both[group][name] = 0.5;
+    expect_error(both, std::string(group) + "." + name, {"material", "Leave"});
+  }
+  json published = tree;
+  published["step"] = {{"solver", "published"}};
+  expect_error(published, "material", {"published", "implicit"});
+  for (const char* name : {"youngs_modulus", "poisson_ratio", "density"}) {
+    json less = tree;
+    less["material"].erase(name);
+    expect_error(less, std::string("material.") + name, {"missing"});
+  }
+  tree["material"]["poisson_ratio"] = 0.5;
+  expect_error(tree, "material.poisson_ratio", {"bounds", "0.49"});
 }
 
 TEST(SceneIo, OneEndIsForTheCriterionOfEdges) {

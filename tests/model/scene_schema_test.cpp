@@ -59,6 +59,10 @@ std::vector<json> bases() {
   for (const auto& [name, value] : full.items()) {
     if (name != "walls" && name != "ground") add(name.c_str(), value);
   }
+  add("material", {{"youngs_modulus", 1e4}, {"poisson_ratio", 0.45}, {"density", 1060}});
+  json with_step = found.back();
+  with_step["step"] = {{"solver", "implicit"}, {"iterations", 8}};
+  found.push_back(with_step);
   add("walls", full["walls"]);
   found.back()["ground"] = full["ground"];
   for (const std::string_view kind : kShapeNames) {
