@@ -11,6 +11,7 @@
 
 #include "model/setup.h"
 #include "oracles/eigen.h"
+#include "oracles/step_model/step_model.h"
 
 namespace cutproof::oracles {
 namespace {
@@ -26,6 +27,8 @@ constexpr double kRounds = 32;
 constexpr Real kNear = 0.01L;
 // Conditions of the answer itself; extended precision leaves far less.
 constexpr Real kMeets = 1e-13L;
+// Of several answers the one nearest to another matrix is that of a problem that is pulled there by so much.
+constexpr Real kPull = 1e-9L;
 constexpr int kSamples = 400, kHalvings = 110;
 
 // p1 and p2 for a given p3: all p (p - σ) are equal, and p1 and p2 are the greater roots.
@@ -77,14 +80,25 @@ double growth_at(const Vector& sigma, const Vector& p) {
   return least > 0 ? static_cast<double>(std::max(greatest, 1 / least)) : kInfinite;
 }
 
-// W = U diag(p) Zᵀ nearest to G among matrices of this determinant.
-Matrix nearest_product(const Matrix& g, Real product, VolumeTarget& target) {
-  const Eigen::JacobiSVD<Matrix> svd(g, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Matrix u = svd.matrixU(), z = svd.matrixV();
-  Vector sigma = svd.singularValues();
-  if (u.determinant() * z.determinant() < 0) sigma[2] = -sigma[2];
-  if (u.determinant() < 0) u.col(2) *= -1;
-  if (z.determinant() < 0) z.col(2) *= -1;
+// G = U diag(σ) Zᵀ, U and Z rotations.
+struct Decomposition {
+  explicit Decomposition(const Matrix& g) {
+    const Eigen::JacobiSVD<Matrix> svd(g, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    u = svd.matrixU();
+    z = svd.matrixV();
+    sigma = svd.singularValues();
+    if (u.determinant() * z.determinant() < 0) sigma[2] = -sigma[2];
+    if (u.determinant() < 0) u.col(2) *= -1;
+    if (z.determinant() < 0) z.col(2) *= -1;
+  }
+  Matrix u, z;
+  Vector sigma;
+};
+
+// W = U diag(p) Zᵀ nearest to G among matrices of this determinant. `towards`: towards this one of several.
+Matrix nearest_product(const Matrix& g, Real product, const Matrix& towards, double tie, VolumeTarget& target) {
+  const Decomposition of(g);
+  const Vector& sigma = of.sigma;
   const Real middle = std::max(sigma[2] / 2, Real(0)), greatest = std::max(std::cbrt(product), middle) * (1 + kMeets);
   std::vector<Real> candidates = passes(sigma, product, middle, greatest, 1);
   // p1 < σ1 and p2 < σ2 below σ3 / 2, so that no product is great enough below this.
@@ -100,14 +114,21 @@ Matrix nearest_product(const Matrix& g, Real product, VolumeTarget& target) {
   }
   const Vector p = values_at(sigma, candidates.front());
   target.growth = growth_at(sigma, p);
+  target.gap = sigma[0] > 0 ? static_cast<double>((sigma[1] + sigma[2]) / sigma[0]) : 0;
+  if (p[2] < sigma[2] / 2) target.gap = std::min(target.gap, static_cast<double>((sigma[1] - sigma[2]) / sigma[0]));
   target.lead = kInfinite;
   if (candidates.size() > 1) target.lead = static_cast<double>(distance(candidates[1]) - distance(candidates[0]));
-  return u * p.asDiagonal() * z.transpose();
+  if (target.gap <= tie) {
+    const Decomposition pulled(g + kPull * std::max(sigma[0] / towards.norm(), kMeets) * towards);
+    return pulled.u * p.asDiagonal() * pulled.z.transpose();
+  }
+  return of.u * p.asDiagonal() * of.z.transpose();
 }
 
 }  // namespace
 
-VolumeTarget volume_target(const Mat3& a, const Mat3& rest_moment, const Mat3& rotation) {
+VolumeTarget volume_target(const Mat3& a, const Mat3& rest_moment, const Mat3& rotation, double tie,
+                           const Mat3* towards) {
   VolumeTarget target;
   target.v = rotation;
   target.inverse_root.m.fill(0);
@@ -131,14 +152,16 @@ VolumeTarget volume_target(const Mat3& a, const Mat3& rest_moment, const Mat3& r
     w = g;
     v = g * inverse_root + r * (Matrix::Identity() - axes * inverse.cwiseSign().asDiagonal() * axes.transpose());
   } else {
-    w = nearest_product(g, std::sqrt(extent.prod()), target);
+    const Matrix root = axes * extent.cwiseSqrt().asDiagonal() * axes.transpose();
+    w = nearest_product(g, std::sqrt(extent.prod()),
+                        as_eigen(towards != nullptr ? *towards : rotation).cast<Real>() * root, tie, target);
     v = w * inverse_root;
     // The conditions of the answer: its determinant, and (V A0 - A) Vᵀ = μ I.
     const Matrix condition = (w - g) * w.transpose();
     const Real size = w.norm() + g.norm();
     const bool meets = std::abs(v.determinant() - 1) <= kMeets * (1 + std::pow(v.norm(), Real(3))) &&
                        (condition - condition.trace() / 3 * Matrix::Identity()).norm() <= kMeets * size * size;
-    if (!meets) target.growth = kInfinite;
+    if (!meets && target.gap > tie) target.growth = kInfinite;
   }
   if (std::abs(volume - 1) < kNear) target.growth = kInfinite;
   for (int k = 0; target.is_flat && k < 3; ++k) {
@@ -156,7 +179,9 @@ VolumeTarget volume_target(const Mat3& a, const Mat3& rest_moment, const Mat3& r
 double VolumeTarget::rounding(double off, double sums, double u) const {
   const double of_moments = (off + sums * stretch) * thinness;
   const double found = growth * (of_moments + kRounds * u * size);
-  const bool is_decided = found < size / 8 && (is_flat || lead > 4 * (of_moments + kRounds * u * size));
+  // Nearer to a tie a backend chooses.
+  const bool is_sure = is_flat || (gap > degenerate_rounds(u) * u && lead > 4 * (of_moments + kRounds * u * size));
+  const bool is_decided = found < size / 8 && is_sure;
   return is_decided ? found : 2 * size;
 }
 

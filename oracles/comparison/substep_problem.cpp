@@ -8,6 +8,7 @@
 
 #include "oracles/eigen.h"
 #include "oracles/oracles.h"
+#include "oracles/step_model/step_model.h"
 #include "oracles/support.h"
 #include "oracles/volume_target.h"
 
@@ -171,7 +172,8 @@ Poses poses_at(const SubstepProblem& problem, const std::vector<Vec3>& x, const 
     poses.volume.push_back(r);
     poses.map.push_back(r);
     if (problem.volume_share == 0) continue;
-    const VolumeTarget volume = volume_target(to_mat3(a), problem.moments[at(c)], r);
+    const VolumeTarget volume =
+        volume_target(to_mat3(a), problem.moments[at(c)], r, degenerate_rounds(kUnitRoundoff) * kUnitRoundoff);
     poses.volume.back() = volume.v;
     poses.map.back() = volume.map(problem.volume_share, r);
   }

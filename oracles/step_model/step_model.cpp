@@ -504,7 +504,13 @@ void StepModel::Run::match_shapes(int32_t s, int32_t j) {
     VolumeTarget volume;
     double volume_rounding = 0;
     if (const double share = setup_.step.volume_share; share > 0) {
-      volume = volume_target(to_mat3(a), cluster.moments, r);
+      const double tie = degenerate_rounds(u_) * u_;
+      volume = volume_target(to_mat3(a), cluster.moments, r, tie);
+      if (disturbed_ && volume.gap <= tie) {  // any of several
+        const Eigen::AngleAxisd turn(std::numbers::pi * noise_(), as_eigen(normalized(noise_.vector())));
+        const Mat3 towards = to_mat3(turn.toRotationMatrix());
+        volume = volume_target(to_mat3(a), cluster.moments, r, tie, &towards);
+      }
       const double sums = sum_rounds(terms) * u_, off = sums * size.norm() + kRotationRounds * u_ * a.norm();
       volume_rounding = share * volume.rounding(off, sums, u_);
       if (volume.is_open(off, sums, u_)) note_open(c);

@@ -132,6 +132,7 @@ TEST(VolumeTarget, KnowsFlatClusters) {
   EXPECT_FALSE(flat(1, 1, 0).is_nearly_flat);
   EXPECT_TRUE(flat(1, 1, 1e-5).is_nearly_flat);
   EXPECT_EQ(flat(0, 0, 0).v, Mat3{});
+  EXPECT_FALSE(flat(0, 0, 0).is_open(0, 0, 0x1p-24)) << "one particle";
 }
 
 }  // namespace
