@@ -39,6 +39,10 @@ inline Vec3 stored_place(const Body& body, Precision precision, int32_t i, Vec3 
   return precision == Precision::binary32 ? x - body.rest_position(i) : x;
 }
 
+// Up to this, in units of u, (σ2 + σ3) / σ1 may be taken for zero: backends have thresholds, 9,000 in double precision
+// and 4 to 16 in single, and what rounds moves it.
+inline double degenerate_rounds(double u) { return u < 1e-10 ? 1e4 : 64; }
+
 // Bound of a sum of many roundings of one size, in standard deviations: exceeded with probability 3e-14 (Higham and
 // Mary 2019; tolerances.md, Linear momentum).
 inline constexpr double kDeviations = 8;

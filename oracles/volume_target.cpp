@@ -11,7 +11,7 @@
 
 #include "model/setup.h"
 #include "oracles/eigen.h"
-#include "oracles/step_model/step_model.h"
+#include "oracles/rounding.h"
 
 namespace cutproof::oracles {
 namespace {

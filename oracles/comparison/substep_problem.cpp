@@ -8,7 +8,7 @@
 
 #include "oracles/eigen.h"
 #include "oracles/oracles.h"
-#include "oracles/step_model/step_model.h"
+#include "oracles/rounding.h"
 #include "oracles/support.h"
 #include "oracles/volume_target.h"
 

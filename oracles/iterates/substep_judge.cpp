@@ -11,7 +11,6 @@
 #include "oracles/eigen.h"
 #include "oracles/memberships.h"
 #include "oracles/rest_places.h"
-#include "oracles/step_model/step_model.h"
 #include "oracles/support.h"
 #include "oracles/volume_target.h"
 

@@ -42,10 +42,6 @@ struct StepOutcome {
   double impulse_rounding = 0;        // [(kg m/s)²]
 };
 
-// Up to this, in units of u, (σ2 + σ3) / σ1 may be taken for zero: backends have thresholds, 9,000 in double precision
-// and 4 to 16 in single, and what rounds moves it.
-inline double degenerate_rounds(double u) { return u < 1e-10 ? 1e4 : 64; }
-
 class StepModel {
  public:
   // `before`: the state in which the step of frame before.frame begins, well formed and finite; the schedule is not
