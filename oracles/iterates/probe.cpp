@@ -241,7 +241,7 @@ void IterateProbe::judge(const ShownStep& shown, Verdict& verdict) const {
     const State& began = of.substep == 0 ? shown.before : state_after({of.substep - 1, setup_.step.iterations});
     const auto state = [&](int32_t k) -> const State& { return state_after({of.substep, k}); };
     const auto shows = [&](int32_t k) { return std::binary_search(of.iterations.begin(), of.iterations.end(), k); };
-    SubstepJudge judge(setup_, before_.frame, of.substep, began);
+    SubstepJudge judge(setup_, before_.frame, of.substep, began, shown.before);
     if (shows(0)) judge.prediction(state(0));
     for (int32_t k = 0; k < setup_.step.iterations; ++k) {
       const bool needs_earlier = k > 0 && combines_two(setup_);

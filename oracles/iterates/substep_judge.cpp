@@ -55,7 +55,8 @@ const char* name_of(IteratePart part) {
   return kNames[static_cast<int>(part)];
 }
 
-SubstepJudge::SubstepJudge(const Setup& setup, int64_t frame, int32_t substep, const State& began)
+SubstepJudge::SubstepJudge(const Setup& setup, int64_t frame, int32_t substep, const State& began,
+                           const State& frame_began)
     : setup_(setup),
       began_(began),
       u_(unit_roundoff(began) + unit_roundoff(Precision::binary64)),
@@ -112,6 +113,9 @@ SubstepJudge::SubstepJudge(const Setup& setup, int64_t frame, int32_t substep, c
       const Vec3 x = began.x[at(i)];
       greatest = std::max(
           {greatest, norm(stored(i, x)), norm(stored(i, x - dt_ / std::max(decay_, kLeast) * began.v[at(i)]))});
+      // A carried place is the frame's first one plus what the frame has added, which rounds by its own size and may
+      // all but cancel it. (That is as true without volume, where this bound leaves it out.)
+      if (step.volume_share > 0) greatest = std::max(greatest, norm(stored(i, frame_began.x[at(i)])));
     }
     for (const int32_t i : began.clusters.of(c)) shared[at(i)] = std::max(shared[at(i)], greatest);
   }
@@ -124,9 +128,7 @@ SubstepJudge::SubstepJudge(const Setup& setup, int64_t frame, int32_t substep, c
     // A backend begins a later substep from places that are not rounded yet. Those shown are off by one rounding, and
     // dt v, the difference of two places, by two. A group sums what its particles have in common, so the rounding is
     // that of the greatest place in the particle's clusters.
-    // A group's map that stretches has two sums more of that size, its linear part in the place and in the velocity.
-    const double times = step.volume_share > 0 ? 5 : 3;
-    const double went_on = first_ ? 0 : times * u_ * std::max(norm(stored(i, x)), shared[at(i)]);
+    const double went_on = first_ ? 0 : 3 * u_ * std::max(norm(stored(i, x)), shared[at(i)]);
     begin_squares_.push_back(square(u_ * norm(stored(i, predicted_.back()))) + square(4 * u_ * inertia_.back()) +
                              square(2 * places_u_ * norm(predicted_.back())) + square(went_on));
     const double height = contact_.height_at_start(x);

@@ -44,7 +44,8 @@ class SubstepJudge {
  public:
   // Substep `substep` of a frame, which begins with `began`: well formed and finite, of the backend's precision; both
   // must live as long as this. Where it is not the first one, `began` rounds what the backend itself goes on from.
-  SubstepJudge(const Setup& setup, int64_t frame, int32_t substep, const State& began);
+  // The frame began with `frame_began`.
+  SubstepJudge(const Setup& setup, int64_t frame, int32_t substep, const State& began, const State& frame_began);
 
   // The state after no iteration.
   void prediction(const State& after);

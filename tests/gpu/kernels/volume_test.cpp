@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "gpu/backends.h"
 #include "oracles/comparison/reference_solution.h"
 #include "oracles/iterates/probe.h"
 #include "oracles/oracles.h"
@@ -29,6 +30,16 @@ using tests::twisted_block;
 Vec3 noise_of(std::size_t i) {
   const auto k = static_cast<double>(i);
   return {std::sin(7 * k), std::sin(11 * k), std::cos(5 * k)};
+}
+
+// At rest but for noise, of six iterations in each substep.
+Scene displaced_block(int32_t nx, int32_t ny, int32_t nz, int32_t side, double volume_share, double far) {
+  Scene scene{tests::setup_of(tests::block_body(nx, ny, nz, 0.01)), {}};
+  scene.setup.step.volume_share = volume_share;
+  scene.setup.step.iterations = 6;
+  scene.state = tests::state_of(scene.setup.body, tests::box_clusters(nx, ny, nz, side));
+  for (std::size_t i = 0; i < scene.state.x.size(); ++i) scene.state.x[i] += far * noise_of(i);
+  return scene;
 }
 
 class VolumeKept : public EveryBackend {
@@ -102,15 +113,23 @@ TEST_P(VolumeKept, IsRightFromHardStarts) {
 TEST_P(VolumeKept, IsRightForThinPieces) {
   const std::array<int32_t, 3> sizes[] = {{7, 6, 1}, {8, 1, 1}, {1, 1, 1}, {6, 6, 2}, {9, 2, 2}};
   for (const auto& [nx, ny, nz] : sizes) {
-    SCOPED_TRACE(nx * 100 + ny * 10 + nz);
-    Scene scene{tests::setup_of(tests::block_body(nx, ny, nz, 0.01)), {}};
-    scene.setup.step.volume_share = 0.9;
-    scene.setup.step.iterations = 6;
-    scene.state = tests::state_of(scene.setup.body, tests::box_clusters(nx, ny, nz, 4));
-    for (std::size_t i = 0; i < scene.state.x.size(); ++i) {
-      scene.state.x[i] += 2e-3 * noise_of(i);
+    for (const double far : {2e-4, 2e-3}) {
+      SCOPED_TRACE(testing::Message() << nx << " x " << ny << " x " << nz << ", displaced by " << far);
+      expect_right(displaced_block(nx, ny, nz, 4, 0.9, far));
     }
-    expect_right(scene);
+  }
+}
+
+// Turn this round when bounds of later substeps know the frame's first places without volume, too: a body that comes to
+// rest within a frame rounds by them.
+TEST(KnownGap, TheJudgeOfIteratesRejectsRightSubstepsOfAPlainBody) {
+  const std::unique_ptr<Backend> host = gpu::make_host_backend();
+  for (const double share : {0.0, 0.9}) {
+    const Scene scene = displaced_block(6, 6, 6, 2, share, 2e-4);
+    State before = scene.state;
+    before.precision = host->precision();
+    const oracles::IterateProbe probe(scene.setup, before, oracles::Iterates::all, 1);
+    EXPECT_EQ(probe.judged(oracles::shown_iterates(*host, {&probe, 1}).front()).holds, share > 0);
   }
 }
 
