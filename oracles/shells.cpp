@@ -91,6 +91,7 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
   std::vector<Mat3> maps = clusters.rotation;
   std::vector<VolumeTarget> volumes;
   std::vector<double> volume_rounding;  // of V A0^(1/2), times its share
+  std::vector<double> volume_absolute;  // of it, by absolute coordinates: at most
   std::vector<double> center_rounding;  // rounding of the sum of a cluster's center: squares [m²]
   std::vector<double> absolute;         // both centers of a cluster, as absolute coordinates: at most [m]
   for (int32_t c = 0; c < clusters.count(); ++c) {
@@ -110,24 +111,35 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
     const double sum = sum_rounds(static_cast<double>(members.size())) * u * spread;
     center_rounding.push_back(4 * u * u * dot(mean, mean) + 3 * sum * sum + 3 * u * u * radius * radius);
     const double weights = sum_rounds_at_most(static_cast<double>(members.size()), means[at(c)].mass, heaviest);
-    absolute.push_back(2 * absolute_mean_rounding(state, weights));  // deformed and at rest
+    const double of_mean = absolute_mean_rounding(state, weights);
+    double lengthens = 1;  // at most so many times, the map
     if (const double part = setup.step.volume_share; part > 0) {
       Eigen::Matrix3d a = Eigen::Matrix3d::Zero(), a0 = a;
-      double size = 0;
+      double size = 0, lengths = 0, lengths_at_rest = 0;
       for (const int32_t i : members) {
         const Eigen::Vector3d arm = as_eigen(weighted.position[at(i)] - means[at(c)].rest);
         const Eigen::Vector3d now = weighted.weight[at(i)] * as_eigen(state.x[at(i)] - means[at(c)].current);
         a += now * arm.transpose();
         a0 += weighted.weight[at(i)] * arm * arm.transpose();
         size += now.norm() * arm.norm();
+        lengths += now.norm();
+        lengths_at_rest += weighted.weight[at(i)] * arm.norm();
       }
       if (members.size() == 1) a0.setZero();  // it was the rounding of its centre
       volumes.push_back(volume_target(to_mat3(a), to_mat3(a0), maps[at(c)]));
       const double sums = sum_rounds(static_cast<double>(members.size())) * u;
       const double places = u * spread * std::sqrt(a0.trace() * means[at(c)].mass);
-      volume_rounding.push_back(part * volumes.back().rounding(sums * size + places, sums, u));
+      const double off = sums * size + places;
+      // The errors of both centers add their product to a moment: all else of them cancels.
+      const double p = state.place_rounding, of_centers = means[at(c)].mass * of_mean * of_mean;
+      const double far = off + p * (lengths + lengths_at_rest) + of_centers;
+      const double far_at_rest = a0.trace() > 0 ? sums + (2 * p * lengths_at_rest + of_centers) / a0.trace() : sums;
+      volume_rounding.push_back(part * volumes.back().rounding(off, sums, u));
+      volume_absolute.push_back(part * volumes.back().rounding(far, far_at_rest, u) - volume_rounding.back());
+      lengthens = std::max(1.0, 1 - part + part * as_eigen(volumes.back().v).norm());
       maps[at(c)] = volumes.back().map(part, maps[at(c)]);
     }
+    absolute.push_back((1 + lengthens) * of_mean);  // of the deformed center, and of the arm from that at rest
   }
   std::vector<VertexPlace> places(skin.owner.size());
   for (std::size_t v = 0; v < places.size(); ++v) {
@@ -144,8 +156,9 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
       terms += norm(goal - first);
       squares += center_rounding[at(c)] + 4 * u * u * dot(arm, arm);
       if (!volumes.empty()) {
-        const double off = volume_rounding[at(c)] * volumes[at(c)].lever(arm);
+        const double lever = volumes[at(c)].lever(arm), off = volume_rounding[at(c)] * lever;
         squares += off * off;
+        at_most += volume_absolute[at(c)] * lever;
       }
       at_most += absolute[at(c)];
     }

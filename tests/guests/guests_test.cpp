@@ -1204,6 +1204,33 @@ TEST(PluginsInBothPrecisions, FailByTheLeastThatIsWrong) {
   }
 }
 
+// Stretched clusters that keep volume, far from the origin: their maps follow from rounded coordinates.
+TEST(PluginsInBothPrecisions, CarryTheSkinOfStretchedBodiesFarFromTheOrigin) {
+  constexpr Span kSkin{Stage::skin, Stage::skin};
+  for (const char* const library : kOneStage) {
+    int64_t checked = 0;
+    double greatest = 0;
+    for (uint64_t seed = 1; seed <= 60; ++seed) {
+      property_tests::Instance one = property_tests::instance_of(property_tests::draw_moving_case(seed, 30));
+      if (one.setup.step.solver != Solver::implicit) continue;
+      const double h = one.setup.body.grid.spacing;
+      one.setup.step.volume_share = 0.9;
+      one.setup.skin.wanted = true;
+      for (Vec3& x : one.state.x) x = h * Vec3{1000, -700, 300} + Vec3{1.7 * x.x + 0.2 * x.y, 0.9 * x.y, 0.7 * x.z};
+      const std::unique_ptr<Backend> guest = make_plugin_backend(backend_name(library, "plain"));
+      guest->load({one.setup}, {one.state});
+      guest->run(kSkin);
+      const State right = guest->snapshot().front();
+      const Verdict verdict = oracles::skin_vertices(one.setup, right);
+      EXPECT_TRUE(verdict.holds) << verdict.witness.text;
+      checked += verdict.checked;
+      greatest = std::max(greatest, verdict.measured / verdict.bound);
+    }
+    EXPECT_GT(checked, 1000);
+    EXPECT_GT(greatest, 0.01) << "no more than rounding needs";
+  }
+}
+
 // What no precision explains.
 TEST(PluginsInBothPrecisions, AreFoundWhereWeightsOrPiecesAreWrong) {
   for (const char* const library : kOneStage) {

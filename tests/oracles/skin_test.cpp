@@ -298,14 +298,18 @@ TEST(SkinVertices, AcceptsWhatTheSumOverManyClustersRounds) {
 }
 
 TEST(SkinVertices, RejectsAVertexThatIsOffByABillionthOfTheSpacing) {
-  Scene scene = scene_of(block_nodes({0, 0, 0}, {4, 4, 4}));
-  scene.state.skin.position[17].y += 1e-9;
-  const Verdict verdict = skin_vertices(scene.setup, scene.state);
-  EXPECT_FALSE(verdict.holds);
-  EXPECT_NEAR(verdict.measured, 1e-9, 1e-12);
-  EXPECT_TRUE(names_particle(verdict, scene.state.skin.owner[17]));
-  scene.state.skin.position[17].y = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_FALSE(skin_vertices(scene.setup, scene.state).holds);
+  for (const double volume_share : {0.0, 0.9}) {
+    Scene scene = scene_of(block_nodes({0, 0, 0}, {4, 4, 4}));
+    scene.setup.step.volume_share = volume_share;
+    EXPECT_TRUE(skin_vertices(scene.setup, scene.state).holds);
+    scene.state.skin.position[17].y += 1e-9;
+    const Verdict verdict = skin_vertices(scene.setup, scene.state);
+    EXPECT_FALSE(verdict.holds);
+    EXPECT_NEAR(verdict.measured, 1e-9, 1e-12);
+    EXPECT_TRUE(names_particle(verdict, scene.state.skin.owner[17]));
+    scene.state.skin.position[17].y = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_FALSE(skin_vertices(scene.setup, scene.state).holds);
+  }
 }
 
 TEST(SkinReach, IsWhereTheBladeCrossesAnEdgeThatACutHasOpened) {
