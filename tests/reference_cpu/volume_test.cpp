@@ -78,21 +78,52 @@ TEST(ClosestVolume, HasDeterminantOneAndMeetsTheLagrangeCondition) {
   }
 }
 
+// The smallest distance to U diag(p) Zᵀ A0^(-1/2), G = U diag(σ) Zᵀ, that a search by log p finds from here.
+double found_from(Eigen::Vector2d at, const Eigen::Vector3d& sigma, double side) {
+  const auto distance_at = [&](const Eigen::Vector2d& p) {
+    return (side * Eigen::Vector3d(p[0], p[1], -p[0] - p[1]).array().exp() - sigma.array()).square().sum();
+  };
+  double here = distance_at(at);
+  for (double step = 0.2; step > 1e-7;) {
+    const double before = here;
+    for (const Eigen::Vector2d& way : {Eigen::Vector2d(1, 0), {-1, 0}, {0, 1}, {0, -1}, {1, -1}, {-1, 1}}) {
+      const Eigen::Vector2d next = at + step * way;
+      if (const double there = distance_at(next); there < here) {
+        at = next;
+        here = there;
+      }
+    }
+    if (here == before) step /= 2;
+  }
+  return here;
+}
+
 TEST(ClosestVolume, IsNotFartherThanAnyOtherOfDeterminantOne) {
   Draw draw(2);
-  for (int k = 0; k < 60; ++k) {
+  for (int k = 0; k < 90; ++k) {
     const Matrix a0 = draw.rest_moment();
-    // Near the dilation where the answer jumps, and anywhere.
-    const Matrix f = k % 2 == 0 ? Matrix((1.6 + 0.01 * k) * draw.turn() * (Matrix::Identity() + 0.05 * draw.matrix()))
-                                : Matrix(2 * draw.matrix());
+    const Eigen::SelfAdjointEigenSolver<Matrix> extents(a0);
+    const Matrix inverse = extents.operatorInverseSqrt();
+    const double side = std::pow(a0.determinant(), 1.0 / 6);
+    // Around the dilation of the norm of A0 where the answer jumps, of the body, and anywhere.
+    const Matrix near = draw.turn() * (Matrix::Identity() + (k % 3 == 0 ? 1e-4 : 0.05) * draw.matrix());
+    const Matrix f = k % 3 == 0   ? Matrix((1.85 + 0.0015 * k) * side * near * inverse)
+                     : k % 3 == 1 ? Matrix((1.6 + 0.01 * k) * near)
+                                  : Matrix(2 * draw.matrix());
     const double best = distance(nearest(f, a0), f, a0);
-    for (int other = 0; other < 300; ++other) {
+    const Matrix g = f * a0 * inverse;
+    Eigen::Vector3d sigma = g.jacobiSvd().singularValues();
+    if (g.determinant() < 0) sigma[2] *= -1;
+    for (const Eigen::Vector2d& start : {Eigen::Vector2d(0, 0), {0.5, 0.5}, {0.5, -1}, {-1, 0.5}}) {
+      EXPECT_GE(found_from(start, sigma, side), best * (1 - 1e-12)) << f;
+    }
+    for (int other = 0; other < 8; ++other) {
       Matrix v = draw.turn() * Eigen::Vector3d(std::exp(draw.normal()), std::exp(draw.normal()), 1).asDiagonal();
       v.col(2) /= v.determinant();
       v = v * draw.turn();
-      // Down along the surface, as far as 200 steps lead.
+      // Down along the surface, as far as 100 steps lead.
       double here = distance(v, f, a0), step = 0.5;
-      for (int down = 0; down < 200; ++down) {
+      for (int down = 0; down < 100; ++down) {
         Matrix next = v + step * (f - v) * a0 / a0.trace();
         if (const double volume = next.determinant(); volume > 0) next /= std::cbrt(volume);
         const double there = distance(next, f, a0);
