@@ -114,8 +114,8 @@ SubstepJudge::SubstepJudge(const Setup& setup, int64_t frame, int32_t substep, c
       greatest = std::max(
           {greatest, norm(stored(i, x)), norm(stored(i, x - dt_ / std::max(decay_, kLeast) * began.v[at(i)]))});
       // A carried place is the frame's first one plus what the frame has added, which rounds by its own size and may
-      // all but cancel it. (That is as true without volume, where this bound leaves it out.)
-      if (step.volume_share > 0) greatest = std::max(greatest, norm(stored(i, frame_began.x[at(i)])));
+      // all but cancel it.
+      greatest = std::max(greatest, norm(stored(i, frame_began.x[at(i)])));
     }
     for (const int32_t i : began.clusters.of(c)) shared[at(i)] = std::max(shared[at(i)], greatest);
   }
