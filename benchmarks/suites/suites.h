@@ -90,6 +90,18 @@ struct BaselinesOptions {
 };
 nlohmann::json run_baselines(const BaselinesOptions& options, const Progress& progress);
 
+// Bars of a material beside closed forms (benchmarks/material.h).
+struct MaterialOptions {
+  std::string backend = harness::kReferenceName;
+  std::vector<std::string> along = {"100"};
+  std::vector<std::string> cooking = {"boxes"};
+  std::vector<int32_t> sides = {2, 5};
+  std::vector<double> poisson_ratios = {0, 0.45};
+  std::vector<int32_t> across = {10};
+  std::vector<int32_t> iterations = {2, 4, 8};  // a row each, of bars along 100
+};
+nlohmann::json run_material(const MaterialOptions& options, const Progress& progress);
+
 // The least disturbance of a run that its judge rejects, by property and stage.
 struct SensitivityOptions {
   std::string backend = harness::kReferenceName;

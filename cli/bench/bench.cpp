@@ -21,7 +21,7 @@ void add_bench(CLI::App& program, Work& work) {
   CLI::App* const bench = program.add_subcommand("bench", "times, each beside its error");
   const auto suite = std::make_shared<Work>();
   for (const auto add : {add_stages, add_sampling, add_clusters, add_scale, add_rotations, add_machine_limits,
-                         add_solver, add_baselines, add_sensitivity, add_parts, add_campaigns}) {
+                         add_solver, add_baselines, add_sensitivity, add_parts, add_campaigns, add_material}) {
     add(*bench, *suite);
   }
   std::vector<std::string> names;

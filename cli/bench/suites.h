@@ -31,6 +31,7 @@ void add_baselines(CLI::App& bench, Work& work);
 void add_sensitivity(CLI::App& bench, Work& work);
 void add_parts(CLI::App& bench, Work& work);
 void add_campaigns(CLI::App& bench, Work& work);
+void add_material(CLI::App& bench, Work& work);
 
 // The run of a suite, and the output of its document: before the first row, after each row, and at the end.
 struct Suite {

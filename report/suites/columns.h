@@ -28,11 +28,11 @@ struct Suite {
   void (*add)(Sheet& sheet, const Field& document);  // to a page
 };
 extern const Suite kStagesSuite, kSamplingSuite, kClustersSuite, kScaleSuite, kRotationsSuite, kMachineLimitsSuite,
-    kSolverSuite, kBaselinesSuite, kSensitivitySuite, kPartsSuite, kCampaignsSuite;
+    kSolverSuite, kBaselinesSuite, kSensitivitySuite, kPartsSuite, kCampaignsSuite, kMaterialSuite;
 
-inline constexpr const Suite* kSuites[] = {&kStagesSuite,      &kSamplingSuite,      &kClustersSuite, &kScaleSuite,
-                                           &kRotationsSuite,   &kMachineLimitsSuite, &kSolverSuite,   &kBaselinesSuite,
-                                           &kSensitivitySuite, &kPartsSuite,         &kCampaignsSuite};
+inline constexpr const Suite* kSuites[] = {&kStagesSuite,      &kSamplingSuite,      &kClustersSuite,  &kScaleSuite,
+                                           &kRotationsSuite,   &kMachineLimitsSuite, &kSolverSuite,    &kBaselinesSuite,
+                                           &kSensitivitySuite, &kPartsSuite,         &kCampaignsSuite, &kMaterialSuite};
 
 // Table 3, in the document of the suite `baselines`.
 extern const Suite kMethodsOfBaselines;

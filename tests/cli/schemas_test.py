@@ -208,7 +208,8 @@ def measured(program):
                   "scale --sizes 1000 --frames 1 --repeats 1", "rotations --matrices 10 --timed 100 --repeats 1",
                   "machine_limits --repeats 1", "solver --particles 0 --stiffness 1e5 --iterations 1,64 --samples 1",
                   "baselines --particles 300", "sensitivity --particles 100 --moments 1 --backend host",
-                  "parts small.json --repeats 1 --backend host", "campaigns --kinds moving --cases 4 --backend host"):
+                  "parts small.json --repeats 1 --backend host", "campaigns --kinds moving --cases 4 --backend host",
+                  "material --sides 2 --poisson-ratio 0.3 --across 4 --iterations 4 --backend host"):
         run("bench " + suite)
 
 

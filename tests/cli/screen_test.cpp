@@ -58,7 +58,8 @@ TEST_F(Screen, IsNotLeftByAnyVerb) {
         "bench clusters --particles 500 --tau 0.5", "bench scale --sizes 1000 --repeats 1 --frames 1",
         "bench rotations --matrices 1 --timed 10 --repeats 1 --cases", "bench baselines --particles 200",
         "bench solver --particles 0 --samples 1 --iterations 1,2 --substeps 1",
-        "bench sensitivity --particles 100 --moments 1"}) {
+        "bench sensitivity --particles 100 --moments 1",
+        "bench material --sides 2 --poisson-ratio 0 --across 4 --iterations 4 --backend host"}) {
     all.emplace_back(command);
   }
   for (const std::string& command : all) {
@@ -104,7 +105,8 @@ TEST_F(Screen, IsNotLeftByAnyPageOfHelp) {
                            "bench machine_limits",
                            "bench solver",
                            "bench baselines",
-                           "bench sensitivity"}) {
+                           "bench sensitivity",
+                           "bench material"}) {
     pages.emplace_back(verb);
   }
   for (const std::string& page : pages) {
