@@ -3,8 +3,6 @@
 
 Usage: extract_results.py fronts TUNE.json...      of `cutproof tune SCENE --full --backend gpu --json`
        extract_results.py lockstep RUN.json...     of `cutproof run SCENE --backend host --against reference --mode lockstep`
-       extract_results.py cut_faces RUN.json...    of `cutproof run SCENE --backend host --errors geometry`, with
-                                                   `--set detect.remove=R --set skin.fit_cuts=F` and in files SCENE.R.F.json
        extract_results.py geometry RUN.json...     of `cutproof run SCENE --backend gpu --errors geometry --set detect.remove=R`, at
                                                    several sizes
        extract_results.py baselines BENCH.json...  of `cutproof bench baselines --backend gpu --particles N --seed S`
@@ -52,17 +50,6 @@ def lockstep(documents):
                      "positions_not_compared": sum(run["frames"]["positions_not_compared"]), "greatest": run["greatest"]})
     write("cpu_lockstep_host", {"command": "cutproof run SCENE --backend host --against reference --mode lockstep",
                                 "left_out": "verdicts, what each frame did"}, "scenes", rows)
-
-
-def cut_faces(documents):
-    rows = []
-    for file, document in documents:
-        scene, remove, fit_cuts = file.stem.split(".")
-        kept = {key: document["errors"]["geometry"][key] for key in ("lost_per_area", "least_per_area", "hausdorff", "skin_rms")}
-        rows.append({"scene": scene, "particles": document["body"]["particles"], "remove": remove,
-                     "fit_cuts": fit_cuts == "true", **kept})
-    write("cpu_cut_faces_host", {"command": "cutproof run SCENE --backend host --errors geometry --set detect.remove=R "
-                                            "--set skin.fit_cuts=F", "left_out": "verdicts, what each frame did"}, "rows", rows)
 
 
 def geometry(documents):
@@ -114,7 +101,7 @@ def isolation(text):
 
 
 def main(arguments):
-    makers = {"fronts": fronts, "lockstep": lockstep, "cut_faces": cut_faces, "geometry": geometry, "baselines": baselines,
+    makers = {"fronts": fronts, "lockstep": lockstep, "geometry": geometry, "baselines": baselines,
               "solver": solver}
     if len(arguments) < 2 or arguments[0] not in {*makers, "isolation"}:
         sys.exit(__doc__)

@@ -202,6 +202,8 @@ def errors(read):
     last = [levels[-1]["apart_h"] for levels in limits.values()]
     known = [known_to(read(f"cpu_tune_retarded_{scene}")) for scene in CUT_SCENES]
     known = [value for value in known if value is not None]
+    bars = [row["measured"] / row["asked"] for row in read("h200_material")["rows"]
+            if (row["test"], row["quantity"]) == ("hanging", "E")]
     return table(["error", "size", "depends on"], [
         ["implementation: single beside double precision, one frame",
          f"at most {figure(max(one['greatest']['position']['max'] for one in lockstep))} h in scenes, "
@@ -215,7 +217,8 @@ def errors(read):
         ["time step",
          f"between the last two levels {span(last)} h; with retardation known to "
          f"{figure(min(known))}–{figure(max(known))} h in {len(known)} of {len(CUT_SCENES)} cut scenes", "dt, damping"],
-        ["model: another cluster size is another material", "not measured", "cluster size"]])
+        ["model: Young's modulus of hanging bars", f"{span(bars)} of what the material asks; "
+         "[bent and twisted](material.md) far more", "clusters across"]])
 
 
 def single_steps(read):
@@ -324,15 +327,6 @@ def geometry(read):
                      span([run["hausdorff"] for run in runs["nearer"]], 1),
                      span([run["skin_rms"] for run in runs["nearer"]])])
     return table(["scene", "both: × least", "one", "nearer", "Hausdorff", "skin RMS"], rows)
-
-
-def cut_faces(read):
-    """Distance of the skin from the blade's path: both ends placed halfway, and each rule fitted."""
-    found = {(row["scene"], row["remove"], row["fit_cuts"]): row for row in read("cpu_cut_faces_host")["rows"]}
-    columns = (("both", False), ("both", True), ("one", True), ("nearer", True))
-    scenes = [scene for scene in CUT_SCENES if (scene, "nearer", True) in found]
-    rows = [[scene, *(figure(found[scene, *of]["skin_rms"]) for of in columns)] for scene in scenes]
-    return table(["scene", "both, halfway", "both, fitted", "one, fitted", "nearer, fitted (default)"], rows)
 
 
 def baselines(read):
@@ -450,7 +444,7 @@ PAPER_FRAMES = {"tets": (22.1, 56.3, 64.4, 105.7), "fem": (70.2, 310.6, 601.1, 2
 
 
 def methods(read):
-    """Table 3; kicks were asked at the two smaller sizes."""
+    """Table 3."""
     def share(value, digits=2):
         return "–" if value is None else "0" if value == 0 else figure(value, digits)
 
@@ -468,14 +462,16 @@ def methods(read):
             continue
         if name == "nearer end of each edge":  # as one end
             continue
+        if name == "clusters deleted, no split" and size not in (PAPER_SIZES[0], PAPER_SIZES[-1]):
+            continue
         settings = "" if is_rule else settings.replace("iterations=", "K = ")
         rows.append([name + (f", {settings}" if settings else ""), f"{row['particles']:,}", milliseconds(row["frame"]),
                      milliseconds(row["cutting"]), figure(row["seconds_per_second"]),
                      percent(row["error"]["rms"], 1), row["pieces"]["coupled"], share(row["felt"]["blade_in"]),
                      share(row["felt"]["withdrawn"]), percent(max(0, row["lost"]), 1) if row["lost"] > 1e-6 else "0",
-                     share(row["spin_kept"], 3), f"{paper[PAPER_SIZES.index(size)]:g}" if paper else "–"])
+                     f"{paper[PAPER_SIZES.index(size)]:g}" if paper else "–"])
     return table(["method", "particles", "frame, ms", "cutting, ms", "s/s", "error", "bodies", "felt, blade in", "withdrawn",
-                  "lost", "spin", "paper, ms"], rows)
+                  "lost", "paper, ms"], rows)
 
 
 def methods_on_cores(read):
@@ -490,14 +486,30 @@ def methods_on_cores(read):
     return table(["method", "frame, ms", "s/s", "error", "bodies"], rows)
 
 
+def material(read):
+    found = {}
+    for row in read("h200_material")["rows"]:
+        if row["iterations"] is None:
+            found.setdefault((row["poisson_ratio"], row["side"], row["across"]), {})[row["test"], row["quantity"]] = row
+    rows = []
+    for (nu, side, across), of in sorted(found.items()):
+        if across == 20:
+            continue  # the picture has it
+        share = lambda test, quantity="E": f"{of[test, quantity]['measured'] / of[test, quantity]['asked']:.2f}"  # noqa: E731
+        rows.append([f"{nu:g}", side, across, share("hanging"), f"{abs(of['hanging', 'ν']['measured']):.3f}",
+                     f"{of['pulled by a fifth', 'volume']['measured']:.3f}", share("swinging along"),
+                     share("swinging across"), share("twisted", "G")])
+    return table(["ν asked", "side", "across", "E, hanging", "ν", "volume", "E, swinging", "E, bent", "G, twisted"], rows)
+
+
 def mutants_alone(read):
     alone = read("mutation_testing")["alone"]
     rows = [[stage, *(f"{found}/{asked}" for found, asked in counts)] for stage, counts in alone["stages"].items()]
     return table(["stage", *alone["columns"], "any"], rows)
 
 
-TABLES = {of.__name__: of for of in (status, table_1, fig_10, sizes, errors, single_steps, solver, rotations, retardation, front, cut_faces,
-                                     geometry, baselines, sensitivity, methods, methods_on_cores, claims, isolation, cuda_plugins, mutants_by_finder,
+TABLES = {of.__name__: of for of in (status, table_1, fig_10, sizes, errors, single_steps, solver, rotations, retardation, front,
+                                     geometry, baselines, sensitivity, methods, methods_on_cores, material, claims, isolation, cuda_plugins, mutants_by_finder,
                                      mutants_alone)}
 # Documents that only pictures use: docs/images/make.
 OF_PICTURES = {"h200_front_kidney_arc", "h200_front_small_block", "h200_front_cuboid_press", "h200_front_liver_cut"}

@@ -46,8 +46,8 @@ double greatest_change(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
 
 // --- For fixed rotations: E over x and t together --------------------------------------------------------------------
 
-// The factor of a substep's system along one axis. Factorising again for every substep and every set of fixed particles
-// was measured to be fastest (docs/design/decisions.md, Reference solutions are factorised anew).
+// The factor of a substep's system along one axis, made again for every substep and every set of fixed particles:
+// updates of a factor save little.
 std::shared_ptr<const Factor> factorised(const Sparse& matrix, Cholmod& cholmod) {
   auto factor = std::make_shared<const Factor>(cholmod_analyze(matrix.get(), cholmod.get()), cholmod);
   cholmod_factorize(matrix.get(), factor->get(), cholmod.get());
