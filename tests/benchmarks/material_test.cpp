@@ -23,21 +23,24 @@ struct Bar {
 // Cubes that tile hang as the formula of the method says, but where the bar is held.
 TEST(MaterialBars, HaveTheModuliOfTheirMaterial) {
   for (const double nu : {0.0, 0.3, 0.45}) {
-    Bar bar({.side = 2, .poisson_ratio = nu, .across = 8});
+    Bar bar({.side = 2, .poisson_ratio = nu, .across = 6});
     const std::vector<MaterialFigure> hung = bar->hang();
-    EXPECT_NEAR(hung.at(0).measured / hung.at(0).asked, 1, nu == 0 ? 1e-3 : 0.1) << nu;
+    EXPECT_NEAR(hung.at(0).measured / hung.at(0).asked, 1, nu == 0 ? 1e-3 : 0.12) << nu;
     EXPECT_NEAR(hung.at(1).measured, nu, 0.02);
     const MaterialFigure volume = bar->pull();
-    EXPECT_NEAR(volume.measured, volume.asked, 5e-3) << nu;
-    EXPECT_NEAR(volume.asked, nu == 0 ? 1.2 : nu == 0.3 ? 1.075 : 1.02, 5e-3);
+    EXPECT_NEAR(volume.measured, volume.asked, 0.01) << nu;
+    EXPECT_NEAR(volume.asked, nu == 0 ? 1.2 : nu == 0.3 ? 1.075 : 1.02, 0.01);
   }
 }
 
 TEST(MaterialBars, SwingAndDecayAsTheyShould) {
-  for (const std::string along : {"100", "111"}) {
+  // Irregular covers are stiffer.
+  for (const std::string along : {"100", "110", "111"}) {
     Bar bar({.along = along, .side = 2, .across = 8});
-    for (const MaterialFigure& one : {bar->swing_along(), bar->swing_across()})
-      EXPECT_NEAR(one.measured / one.asked, 1, 0.15) << along << " " << one.test;
+    for (const MaterialFigure& one : {bar->swing_along(), bar->swing_across()}) {
+      EXPECT_GT(one.measured / one.asked, 0.95) << along << " " << one.test;
+      EXPECT_LT(one.measured / one.asked, along == "100" ? 1.05 : 1.5) << along << " " << one.test;
+    }
     const MaterialFigure decay = bar->decay();
     EXPECT_NEAR(decay.measured / decay.asked, 1, 0.02) << along;
   }
@@ -70,11 +73,11 @@ TEST(MaterialBars, AreSofterAfterFewIterations) {
 
 TEST(MaterialBars, AreRowsOfTheSuite) {
   MaterialOptions options{.backend = "host", .sides = {2}, .poisson_ratios = {0.3}, .across = {4}, .iterations = {2}};
-  const nlohmann::json document = run_material(options, {});
+  const nlohmann::json document = run_material(options, [](const nlohmann::json&) {});
   EXPECT_EQ(document.at("rows").size(), document.at("rows_at_most"));
   options.along = {"101"};
   try {
-    run_material(options, {});
+    run_material(options, [](const nlohmann::json&) {});
     FAIL() << "it was taken";
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("'101' is no axis of a bar"), std::string::npos) << error.what();
