@@ -3,11 +3,11 @@
 
 #include <Eigen/Dense>
 #include <Eigen/Geometry>
-#include <random>
 
 #include "oracles/eigen.h"
 #include "reference_cpu/reference.h"
 #include "tests/oracles/expectations.h"
+#include "tests/random_matrices.h"
 
 namespace cutproof::volume_target_test {
 namespace {
@@ -18,29 +18,6 @@ using oracles::volume_target;
 using oracles::VolumeTarget;
 using Matrix = Eigen::Matrix3d;
 
-class Draw {
- public:
-  explicit Draw(uint64_t seed) : source_(seed) {}
-  double normal() { return normal_(source_); }
-  Matrix matrix() {
-    Matrix m;
-    for (int row = 0; row < 3; ++row) {
-      for (int column = 0; column < 3; ++column) m(row, column) = normal();
-    }
-    return m;
-  }
-  Matrix turn() { return Eigen::Quaterniond(normal(), normal(), normal(), normal()).normalized().toRotationMatrix(); }
-  Matrix rest_moment() {
-    const Matrix axes = turn();
-    const Eigen::Vector3d extent(1, std::exp(std::tanh(normal())), std::exp(std::tanh(normal())));
-    return axes * extent.asDiagonal() * axes.transpose();
-  }
-
- private:
-  std::mt19937_64 source_;
-  std::normal_distribution<double> normal_;
-};
-
 double apart(const VolumeTarget& target, const Mat3& v, const Matrix& a0) {
   const Matrix off = as_eigen(v) - as_eigen(target.v);
   return std::sqrt((off * a0 * off.transpose()).trace());
@@ -49,7 +26,7 @@ double apart(const VolumeTarget& target, const Mat3& v, const Matrix& a0) {
 // Two algorithms that share nothing agree within the bound, wherever the answer is sure; that is nearly everywhere.
 TEST(VolumeTarget, OfTheReferenceLiesWithinItsRounding) {
   constexpr double u = 0x1p-52;
-  Draw draw(1);
+  MatrixDraw draw(1);
   int open = 0;
   constexpr int kDraws = 20'000;
   for (int k = 0; k < kDraws; ++k) {
@@ -77,7 +54,7 @@ TEST(VolumeTarget, OfTheReferenceLiesWithinItsRounding) {
 // branch, and R.
 TEST(VolumeTarget, TellsApartWhatIsNearlyIt) {
   constexpr double u = 0x1p-52;
-  Draw draw(2);
+  MatrixDraw draw(2);
   for (int k = 0; k < 200; ++k) {
     const Matrix a0 = draw.rest_moment(), r = draw.turn();
     const Matrix f = r * (Matrix::Identity() + 0.05 * draw.matrix()), a = f * a0;

@@ -4,9 +4,9 @@
 #include <Eigen/Dense>
 #include <Eigen/Geometry>
 #include <cmath>
-#include <random>
 
 #include "reference_cpu/reference.h"
+#include "tests/random_matrices.h"
 
 namespace cutproof::volume_test {
 namespace {
@@ -29,31 +29,6 @@ Matrix to_eigen(const Mat3& m) {
   return result;
 }
 
-class Draw {
- public:
-  explicit Draw(uint64_t seed) : source_(seed) {}
-  double normal() { return normal_(source_); }
-  Matrix matrix() {
-    Matrix m;
-    for (int row = 0; row < 3; ++row) {
-      for (int column = 0; column < 3; ++column) m(row, column) = normal();
-    }
-    return m;
-  }
-  Matrix turn() { return Eigen::Quaterniond(normal(), normal(), normal(), normal()).normalized().toRotationMatrix(); }
-  // A rest moment whose extents lie within a factor of four of each other.
-  Matrix rest_moment() {
-    const Matrix axes = turn();
-    Eigen::Vector3d extent;
-    for (int k = 0; k < 3; ++k) extent[k] = std::exp(1.4 * std::tanh(normal()));
-    return axes * extent.asDiagonal() * axes.transpose();
-  }
-
- private:
-  std::mt19937_64 source_;
-  std::normal_distribution<double> normal_;
-};
-
 Matrix nearest(const Matrix& f, const Matrix& a0, const Matrix& r = Matrix::Identity()) {
   return to_eigen(closest_volume(to_mat3(f * a0), to_mat3(a0), to_mat3(r)));
 }
@@ -71,7 +46,7 @@ double off_conditions(const Matrix& v, const Matrix& f, const Matrix& a0) {
 }
 
 TEST(ClosestVolume, HasDeterminantOneAndMeetsTheLagrangeCondition) {
-  Draw draw(1);
+  MatrixDraw draw(1);
   for (int k = 0; k < 4000; ++k) {
     const Matrix a0 = draw.rest_moment(), f = std::exp(draw.normal()) * draw.matrix();  // half are inverted
     EXPECT_LT(off_conditions(nearest(f, a0), f, a0), 1e-12) << f;
@@ -99,7 +74,7 @@ double found_from(Eigen::Vector2d at, const Eigen::Vector3d& sigma, double side)
 }
 
 TEST(ClosestVolume, IsNotFartherThanAnyOtherOfDeterminantOne) {
-  Draw draw(2);
+  MatrixDraw draw(2);
   for (int k = 0; k < 90; ++k) {
     const Matrix a0 = draw.rest_moment();
     const Eigen::SelfAdjointEigenSolver<Matrix> extents(a0);
@@ -140,7 +115,7 @@ TEST(ClosestVolume, IsNotFartherThanAnyOtherOfDeterminantOne) {
 }
 
 TEST(ClosestVolume, IsTheRotationOfARigidMotionAndTurnsWithTheBody) {
-  Draw draw(3);
+  MatrixDraw draw(3);
   for (int k = 0; k < 300; ++k) {
     const Matrix a0 = draw.rest_moment(), q = draw.turn(), f = draw.matrix();
     EXPECT_LT((nearest(q, a0) - q).norm(), 1e-13);
@@ -163,7 +138,7 @@ TEST(ClosestVolume, CollapsesBeyondADilationOf1Point9) {
 
 // Of several nearest ones the one nearest to R, in the norm of A0.
 TEST(ClosestVolume, IsTheOneNearestToTheRotationInATie) {
-  Draw draw(4);
+  MatrixDraw draw(4);
   for (int k = 0; k < 40; ++k) {
     const Matrix a0 = draw.rest_moment(), q = draw.turn(), r = draw.turn();
     const Eigen::SelfAdjointEigenSolver<Matrix> extents(a0);
@@ -187,7 +162,7 @@ TEST(ClosestVolume, IsTheOneNearestToTheRotationInATie) {
 
 // F along the extent, R across it: a flat cluster at rest stays there, also one that is flat but for rounding.
 TEST(ClosestVolume, OfAFlatClusterFollowsItsExtent) {
-  Draw draw(5);
+  MatrixDraw draw(5);
   for (const Eigen::Vector3d& extent :
        {Eigen::Vector3d(1, 2, 0), Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1, 2, 1e-9)}) {
     for (int k = 0; k < 50; ++k) {

@@ -5,10 +5,10 @@
 #include <Eigen/Dense>
 #include <Eigen/Geometry>
 #include <cmath>
-#include <random>
 
 #include "gpu/kernels/volume.cuh"
 #include "reference_cpu/reference.h"
+#include "tests/random_matrices.h"
 
 namespace cutproof::volume_kernel_test {
 namespace {
@@ -19,24 +19,6 @@ struct Problem {
   float a0[3][3];
   gpu::Matrix3 change, r;
   Matrix rest, f, rotation;  // as rounded
-};
-
-class Draw {
- public:
-  explicit Draw(uint64_t seed) : source_(seed) {}
-  double normal() { return normal_(source_); }
-  Matrix matrix() {
-    Matrix m;
-    for (int row = 0; row < 3; ++row) {
-      for (int column = 0; column < 3; ++column) m(row, column) = normal();
-    }
-    return m;
-  }
-  Matrix turn() { return Eigen::Quaterniond(normal(), normal(), normal(), normal()).normalized().toRotationMatrix(); }
-
- private:
-  std::mt19937_64 source_;
-  std::normal_distribution<double> normal_;
 };
 
 Problem problem_of(const Matrix& f, const Eigen::Vector3d& extent, const Matrix& axes, const Matrix& r) {
@@ -89,7 +71,7 @@ double size_of(const Matrix& v, const Problem& problem) {
 constexpr double kRounding = 64 * 0x1p-24;
 
 TEST(VolumeKernel, IsAsNearAsTheReferencesAndHasDeterminantOne) {
-  Draw draw(1);
+  MatrixDraw draw(1);
   for (int k = 0; k < 200'000; ++k) {
     const Eigen::Vector3d extent(1, std::exp(std::tanh(draw.normal())), std::exp(2 * std::tanh(draw.normal())));
     const double wide = std::exp(2 * draw.normal());  // small strains, dilated, inverted
@@ -107,7 +89,7 @@ TEST(VolumeKernel, IsAsNearAsTheReferencesAndHasDeterminantOne) {
 }
 
 TEST(VolumeKernel, FollowsTheReferenceWhereTheAnswerIsSure) {
-  Draw draw(2);
+  MatrixDraw draw(2);
   for (int k = 0; k < 100'000; ++k) {
     const Eigen::Vector3d extent(1, std::exp(std::tanh(draw.normal())), std::exp(2 * std::tanh(draw.normal())));
     const Matrix f = draw.turn() * (Matrix::Identity() + 0.1 * draw.matrix());
@@ -119,7 +101,7 @@ TEST(VolumeKernel, FollowsTheReferenceWhereTheAnswerIsSure) {
 
 // A body at rest, or moved as a whole, has no change of its moments: it stays to the last bit.
 TEST(VolumeKernel, IsTheIdentityToTheBitAtRest) {
-  Draw draw(3);
+  MatrixDraw draw(3);
   for (int k = 0; k < 100; ++k) {
     const Problem problem = problem_of(Matrix::Identity(), {1, 2, 3}, draw.turn(), Matrix::Identity());
     const gpu::Matrix3 map = gpu::goal_map(0.9f, problem.a0, {{0, 0, 0, 0, 0, 0, 0, 0, 0}}, problem.r);
@@ -129,7 +111,7 @@ TEST(VolumeKernel, IsTheIdentityToTheBitAtRest) {
 
 // Collapsed to a plane, a line, a point; inverted; and what a float can hardly hold.
 TEST(VolumeKernel, IsFiniteAndNearestWhereverTheClusterIs) {
-  Draw draw(4);
+  MatrixDraw draw(4);
   for (int k = 0; k < 20'000; ++k) {
     Eigen::Vector3d sigma(1, 1, 1);
     const int kind = k % 7;
@@ -156,7 +138,7 @@ TEST(VolumeKernel, IsFiniteAndNearestWhereverTheClusterIs) {
 }
 
 TEST(VolumeKernel, OfAFlatClusterFollowsItsExtent) {
-  Draw draw(5);
+  MatrixDraw draw(5);
   for (const Eigen::Vector3d& extent : {Eigen::Vector3d(1, 2, 0), Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 0, 0)}) {
     for (int k = 0; k < 100; ++k) {
       // Flat along the grid's axes, so that A0 has exact zeros.
