@@ -25,6 +25,10 @@ WideVector widened(Vec3 v) { return {v.x, v.y, v.z}; }
 // others unless they are a thousand particles long. Between them it is open what a backend takes for flat.
 constexpr long double kFlat = 0x1p-48L, kExtended = 0x1p-20L;
 
+// Pivots up to this part of the greatest say that a direction is flat (method.md, M4.4). Rounded coordinates can leave
+// more, and then F along it is a quotient of two roundings.
+constexpr long double kPivot = 3 * 0x1p-52L;
+
 // Beyond this a sum of squares may be more than single precision can hold.
 constexpr long double kMeasurable = 1e15L;
 
@@ -40,7 +44,8 @@ constexpr long double kTerms = 8, kSweeps = 64;
 
 struct ClusterStretch {
   long double stretch = 0, band = 0;
-  bool is_open = false;  // which direction is flat, or whether it can be computed at all
+  bool is_open = false;             // which direction is flat, or whether it can be computed at all
+  bool may_seem_stretched = false;  // along a direction that is flat but for rounding
 };
 
 ClusterStretch stretch_of_cluster(const WeightedRest& rest, const State& state, int32_t cluster, double u) {
@@ -74,10 +79,17 @@ ClusterStretch stretch_of_cluster(const WeightedRest& rest, const State& state, 
   const WideVector lambda = extents.eigenvalues();  // ascending
   ClusterStretch found;
   if (!(lambda[2] > 0)) return found;
+  const auto n = static_cast<long double>(members.size());
+  const double mean = absolute_mean_rounding(
+      state, sum_rounds_at_most(static_cast<double>(n), static_cast<double>(mass), static_cast<double>(heaviest)));
+  const long double of_means = mass * mean * mean, p = state.place_rounding;
   Wide along = Wide::Zero();  // F times the eigenvectors
   long double least = lambda[2];
   for (int k = 0; k < 3; ++k) {
-    if (lambda[k] <= kFlat * lambda[2]) continue;
+    if (lambda[k] <= kFlat * lambda[2]) {
+      found.may_seem_stretched |= mass * (p + mean) * (p + mean) > kPivot * lambda[2];
+      continue;
+    }
     if (lambda[k] < kExtended * lambda[2]) found.is_open = true;
     least = std::min(least, lambda[k]);
     along.col(k) = a * extents.eigenvectors().col(k) / lambda[k];
@@ -85,10 +97,6 @@ ClusterStretch stretch_of_cluster(const WeightedRest& rest, const State& state, 
   const Eigen::SelfAdjointEigenSolver<Wide> stretches(along.transpose() * along, Eigen::EigenvaluesOnly);
   found.stretch = std::sqrt(std::max(0.0L, stretches.eigenvalues()[2]));
   found.is_open = found.is_open || !(found.stretch < kMeasurable);
-  const auto n = static_cast<long double>(members.size());
-  const double mean = absolute_mean_rounding(
-      state, sum_rounds_at_most(static_cast<double>(n), static_cast<double>(mass), static_cast<double>(heaviest)));
-  const long double of_means = mass * mean * mean, p = state.place_rounding;
   const long double a_off = (n + kTerms) * u * s1 + p * arms_now + of_means;
   const long double a0_off = (n + kTerms) * u * s2 + 2 * p * arms_at_rest + of_means;
   found.band = 2 * (a_off + (1 + found.stretch) * a0_off) / least + kSweeps * u * found.stretch;
@@ -104,10 +112,10 @@ std::vector<StrainDemand> demands_of_strain(const Setup& setup, const State& sta
     if (state.clusters.size(c) == 0) continue;  // coverage rejects it
     const ClusterStretch found = stretch_of_cluster(rest, state, c, unit_roundoff(state));
     const long double limit = setup.detect.strain;
-    const Demand demand = found.is_open                        ? Demand::either
-                          : found.stretch - found.band > limit ? Demand::remove
-                          : found.stretch + found.band > limit ? Demand::either
-                                                               : Demand::keep;
+    const Demand demand = found.is_open                                                    ? Demand::either
+                          : found.stretch - found.band > limit                             ? Demand::remove
+                          : found.stretch + found.band > limit || found.may_seem_stretched ? Demand::either
+                                                                                           : Demand::keep;
     for (const int32_t i : state.clusters.of(c)) {
       StrainDemand& of_particle = demands[at(i)];
       of_particle.demand = std::max(of_particle.demand, demand);

@@ -1106,21 +1106,23 @@ TEST(PluginsInBothPrecisions, HoldInWhateverUnitsAndHoweverTheySum) {
 }
 
 // A block without a grid, far from the origin and all in one cluster, and a cluster of one particle; its middle layer
-// is gone.
-property_tests::Instance far_away(int32_t side, double spacing, Vec3 shift) {
+// is gone. `height`: 0 for a cube.
+property_tests::Instance far_away(int32_t side, double spacing, Vec3 shift, int32_t height = 0) {
+  if (height == 0) height = side;
   property_tests::Instance one;
   Body& body = one.setup.body;
   body.grid.spacing = spacing;
   const auto index = [&](int32_t x, int32_t y, int32_t z) { return x + side * (y + side * z); };
   body.edge_offsets = {0};
-  for (int32_t z = 0; z < side; ++z) {
+  for (int32_t z = 0; z < height; ++z) {
     for (int32_t y = 0; y < side; ++y) {
       for (int32_t x = 0; x < side; ++x) {
         body.rest.push_back(shift + spacing * Vec3{1.0 * x, 1.0 * y, 1.0 * z});
         body.mass.push_back(0.0123);  // no dyadic fraction: equal terms all round the same way
         for (const auto& [dx, dy, dz] : kDirections) {
           const std::array<int32_t, 3> to = {x + dx, y + dy, z + dz};
-          if (std::any_of(to.begin(), to.end(), [&](int32_t k) { return k < 0 || k >= side; })) continue;
+          if (std::any_of(to.begin(), to.end(), [&](int32_t k) { return k < 0 || k >= side; }) || to[2] >= height)
+            continue;
           body.edge_ends.push_back(index(to[0], to[1], to[2]));
         }
         body.edge_offsets.push_back(static_cast<int64_t>(body.edge_ends.size()));
@@ -1142,7 +1144,7 @@ property_tests::Instance far_away(int32_t side, double spacing, Vec3 shift) {
   clusters.rotation.resize(2);
   clusters.degenerate.resize(2);
   reference::update_rest_frames(body, clusters);
-  for (int32_t z = 0; z < side; ++z) {
+  for (int32_t z = 0; z < height; ++z) {
     for (int32_t y = 0; y < side; ++y) {
       state.removed.push_back(index(side / 2, y, z));
       state.alive[at(state.removed.back())] = 0;
@@ -1183,6 +1185,46 @@ TEST(PluginsInBothPrecisions, HoldFarFromTheOriginAndFailThereByTwiceTheBound) {
       }
     }
   }
+}
+
+// A layer at rest, whose thickness single precision far away takes for rounding: some plugins see it stretched.
+TEST(PluginsInBothPrecisions, MayTakeRoundingForTheThicknessOfALayer) {
+  int64_t removed = 0;
+  for (const int32_t height : {1, 5}) {
+    for (int32_t place = 0; place < 20; ++place) {
+      const double far = 0.37 * (place + 1);
+      property_tests::Instance one = far_away(5, 0.01, {far, -0.7 * far, 0.31 * far}, height);
+      one.state.removed.clear();
+      one.state.alive.assign(one.state.x.size(), 1);
+      one.setup.detect = {.criterion = Criterion::strain, .strain = 1.05, .without_blade = true};
+      for (const char* const library : kOneStage) {
+        const std::unique_ptr<Backend> guest = make_plugin_backend(backend_name(library, "plain"));
+        State start = one.state;
+        // As sums in single precision may round it.
+        float center = static_cast<float>(start.clusters.rest_center[0].z);
+        if (library == kOneStage[0])
+          center = std::nextafter(center, INFINITY), start.clusters.rest_center[0].z = center;
+        guest->load({one.setup}, {std::move(start)});
+        const State before = guest->snapshot().front();
+        EXPECT_TRUE(oracles::rest_frames(one.setup, before).holds);
+        guest->run({Stage::detect, Stage::detect});
+        State after = guest->snapshot().front();
+        const bool may_remove = height == 1 && after.precision == Precision::binary32;
+        for (const Verdict& verdict :
+             oracles::judge_stage(one.setup, Stage::detect, before, after, {&oracles::core_properties()}))
+          EXPECT_TRUE(verdict.holds) << verdict.property << ": " << verdict.witness.text;
+        if (may_remove) {
+          removed += std::ssize(after.removed);
+          continue;
+        }
+        EXPECT_TRUE(after.removed.empty());
+        after.removed = {3};
+        after.alive[3] = 0;
+        EXPECT_FALSE(oracles::detection(one.setup, before, after).holds) << "what is thick is no layer";
+      }
+    }
+  }
+  EXPECT_GT(removed, 0) << "no plugin was mistaken";
 }
 
 // The same of a body that lies where most do.
