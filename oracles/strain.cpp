@@ -25,7 +25,7 @@ WideVector widened(Vec3 v) { return {v.x, v.y, v.z}; }
 // others unless they are a thousand particles long. Between them it is open what a backend takes for flat.
 constexpr long double kFlat = 0x1p-48L, kExtended = 0x1p-20L;
 
-// Pivots up to this part of the greatest say that a direction is flat (method.md, M4.4). Rounded coordinates can leave
+// Pivots up to this part of the greatest say that a direction is flat (method.md §4). Rounded coordinates can leave
 // more, and then F along it is a quotient of two roundings.
 constexpr long double kPivot = 3 * 0x1p-52L;
 
