@@ -15,7 +15,7 @@ std::string ratio_of(const Field& row) {
 
 RowColumns columns_of_material() {
   return {{"along", "{along}"},     {"clusters", "{cooking}", Shown::page},
-          {"side", "{side}"},       {"ν", "{poisson_ratio}"},
+          {"side", "{side}"},       {"ν", "{poisson_ratio:.2f}"},
           {"across", "{across}"},   {"K", "{iterations}"},
           {"test", "{test}"},       {"of", "{quantity}"},
           {"asked", "{asked:.4g}"}, {"measured", "{measured:.4g}"},
