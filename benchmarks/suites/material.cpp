@@ -66,6 +66,9 @@ nlohmann::json run_material(const MaterialOptions& options, const Progress& prog
           for (const double nu : options.poisson_ratios) {
             spec.poisson_ratio = nu;
             MaterialBar bar(*backend, spec);
+            require_option(bar.clusters() > 1, "--sides",
+                           fmt::format("{} gives a bar of one cluster, which is rigid", side),
+                           "give less than half of --across");
             for (const MaterialFigure& figure : bar.hang()) add(bar, figure);
             for (const auto test : {&MaterialBar::pull, &MaterialBar::swing_along, &MaterialBar::twist,
                                     &MaterialBar::swing_across, &MaterialBar::decay})

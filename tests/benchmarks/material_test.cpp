@@ -75,6 +75,8 @@ TEST(MaterialBars, AreRowsOfTheSuite) {
   MaterialOptions options{.backend = "host", .sides = {2}, .poisson_ratios = {0.3}, .across = {4}, .iterations = {2}};
   const nlohmann::json document = run_material(options, [](const nlohmann::json&) {});
   EXPECT_EQ(document.at("rows").size(), document.at("rows_at_most"));
+  options.sides = {20};
+  EXPECT_THROW(run_material(options, [](const nlohmann::json&) {}), InputError) << "one cluster";
   options.along = {"101"};
   try {
     run_material(options, [](const nlohmann::json&) {});
