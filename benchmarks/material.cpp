@@ -41,7 +41,7 @@ Scene scene_of(const BarSpec& spec) {
   return scene;
 }
 
-// The fewest iterations, in powers of two, that leave a thousandth of a long wave.
+// The fewest iterations, in powers of two, that leave a thousandth of a long wave's error.
 int32_t enough_iterations(StepParameters step, double dt) {
   step.iterations = 4;
   while (step.iterations < 4096 && std::abs(fixtures::left_by_iterations(step, dt)) > 1e-3) step.iterations *= 2;
@@ -131,10 +131,9 @@ std::vector<MaterialFigure> MaterialBar::hang() {
   const double period = 2 * std::numbers::pi / omega, dt = step_length(period / 40);
   Setup setup = in_steps(dt, std::llround(3 * period / dt));
   // What hangs below the middle, and half of what is level with it.
-  const double middle = middle_;
   double below = 0;
   for (int32_t i = 0; i < particles(); ++i) {
-    const double off = place(i) - middle;
+    const double off = place(i) - middle_;
     below += setup_.body.mass[at(i)] * (std::abs(off) < 1e-6 * kSpacing ? 0.5 : off > 0 ? 1 : 0);
   }
   const double gravity = 0.01 * kYoungsModulus * area_ / below;

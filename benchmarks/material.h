@@ -1,4 +1,4 @@
-// Bars of a material, and what is measured of them beside closed forms (method.md §3, Material).
+// Bars of a material, and what is measured of them beside closed forms (method.md §3, Volume).
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -16,7 +16,7 @@ struct BarSpec {
   int32_t side = 5;  // of the cores of clusters
   double poisson_ratio = 0;
   int32_t across = 10;     // nodes; it is kSlenderness times as long
-  int32_t iterations = 0;  // of a substep; 0: so many that they leave a thousandth of a long wave
+  int32_t iterations = 0;  // of a substep; 0: as many as leave a thousandth of a long wave's error
 };
 inline constexpr int32_t kSlenderness = 5;
 
@@ -38,8 +38,8 @@ class MaterialBar {
   // Its free end is pulled away by a fifth of the length: volume of the middle, of that at rest, beside a bar of
   // constant ν in logarithmic strain.
   MaterialFigure pull();
-  // It is struck along, round or across its axis: the modulus that gives the first frequency. Few iterations are asked
-  // for what they leave of E.
+  // It is struck along, round or across its axis: the modulus that gives the first frequency. A bar of given iterations
+  // is asked for (1 - λ) E (fixtures/material.h).
   MaterialFigure swing_along();
   MaterialFigure twist();
   MaterialFigure swing_across();
@@ -49,7 +49,7 @@ class MaterialBar {
  private:
   struct Oscillation {
     double frequency = 0, retardation = 0;  // [rad/s], [s]
-    double left = 0;                        // of a long wave, by the iterations of a substep
+    double left = 0;                        // λ
     double of_closed_form = 0;
   };
   double place(int32_t particle) const;  // along the axis, from the held layer [m]

@@ -68,7 +68,7 @@ def span(values, digits=2):
 
 
 def percent(part, whole):
-    return f"{100 * part / whole:.2g} %"
+    return f"{float(f'{100 * part / whole:.2g}'):,g} %"
 
 
 def table(head, rows):

@@ -285,7 +285,7 @@ struct Program : Simulator {
     heads = Array<int32_t>(n);
     numbers = Array<int32_t>(n + 1);
     first = Array<int32_t>(n + 1);
-    boxes = Array<Box>(n + n / 31 + 8);
+    boxes = Array<Box>(n + n / 31 + 8);  // n + n / 32 + n / 1024 + …, each rounded up
     is_fine = Array<int32_t>(std::vector<int32_t>(1, 1));
     neighbour = Array<int32_t>(125 * n);
     slot = Array<int32_t>(27 * n);

@@ -12,8 +12,7 @@ void print_row_of_material(const nlohmann::json& document) {
 
 void print_material(const nlohmann::json& document) {
   say_as_it_is("\n" + table_of(document.at("rows"), columns_of(report::kMaterialSuite), 1));
-  say("bars of 10 kPa, five times as long as they are thick; K: iterations where they are few, beside what those leave "
-      "of E\n");
+  say("bars of 10 kPa, five times as long as they are thick; K: given iterations, which are asked for (1 - λ) E\n");
 }
 
 }  // namespace

@@ -114,7 +114,7 @@ struct Product {
     }
     return 0;
   }
-  // Above σ3 / 2 the answer of small strains; below it that of a cluster dilated by more than 1.9. `above`: no answer
+  // Above σ3 / 2 the answer of small strains; below it that of a cluster stretched by more than 1.9 in all directions. `above`: no answer
   // is greater.
   CUTPROOF_BOTH float nearest(float above) const {
     const float middle = 0.5f * sigma[2], least = 1.0f / (per_product * (sigma[0] * sigma[1]));
@@ -152,8 +152,8 @@ CUTPROOF_BOTH inline Matrix3 flat_map(const float (&a0)[3][3], const Matrix3& mo
 
 }  // namespace volume_detail
 
-// V - I of a cluster with A = A0 + moved: the nearest matrix of determinant 1 to F = A A0⁻¹, in the norm of A0. Zero
-// where `moved` is.
+// V - I of a cluster, given rest = A0 and change = A - A0: V is the matrix of determinant 1 nearest to F = A A0⁻¹, in
+// the norm of A0. Zero where `change` is zero.
 CUTPROOF_BOTH inline Matrix3 volume_map(const float (&rest)[3][3], const Matrix3& change, const Matrix3& r) {
   using namespace volume_detail;
   Matrix3 v = {{0, 0, 0, 0, 0, 0, 0, 0, 0}}, moved = v;

@@ -1,5 +1,3 @@
-#include <map>
-
 #include "model/io/columns.h"
 #include "report/suites/suites.h"
 
@@ -42,7 +40,7 @@ void add_material(Sheet& sheet, const Field& document) {
     curve_named(chart, name, Look::joined)
         .dots.push_back({double(row["across"].count()), *measured / row["asked"].number(), name});
   });
-  sheet.summary = "What material bars have, beside what was asked.";
+  sheet.summary = "Moduli of bars, beside those of their material.";
   if (!chart.curves.empty()) sheet.pieces.emplace_back(std::move(chart));
   sheet.pieces.emplace_back(std::move(grid));
 }
