@@ -114,8 +114,8 @@ struct Product {
     }
     return 0;
   }
-  // Above σ3 / 2 the answer of small strains; below it that of a cluster stretched by more than 1.9 in all directions. `above`: no answer
-  // is greater.
+  // Above σ3 / 2 the answer of small strains; below it that of a cluster stretched by more than 1.9 in all directions.
+  // `above`: no answer is greater.
   CUTPROOF_BOTH float nearest(float above) const {
     const float middle = 0.5f * sigma[2], least = 1.0f / (per_product * (sigma[0] * sigma[1]));
     const bool has_regular = !(middle > 0) || ratio(middle) <= 1.0f;
