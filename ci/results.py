@@ -456,7 +456,7 @@ def methods(read):
         settings = row["settings"].removesuffix(",remove=both")
         is_rule = settings.startswith("iterations") and name != "this method"
         # What differs little from size to size stands once.
-        if settings == "steps=1" and size != PAPER_SIZES[-1]:
+        if settings == "steps=1" and size != PAPER_SIZES[-1] or settings == "steps=640" and size not in PAPER_SIZES[-2:]:
             continue
         if (is_rule and paper is None or settings == "labels=0") and size != PAPER_SIZES[0]:
             continue
