@@ -105,9 +105,10 @@ for part in $parts; do
         try "dissect_$method" cutproof judge "guests/${method}_cuda.so" dissect --cases "${CUTPROOF_SCENES:-1000}" \
           --time-limit 60 --save "$results"
       done
-      try methods cutproof bench baselines --backend gpu --sizes 12800,37704,48385,101096 --with guests/fem_cuda.so \
-        --with guests/mpm_cuda.so --with guests/mpm_cuda.so,labels=0 --with guests/tets_cuda.so \
-        --truth guests/fem_cuda.so,newton=3 --truth-particles 400000 --json "$results/methods.json" ;;
+      try methods cutproof bench baselines --backend gpu --sizes 101096,48385,37704,12800 --with guests/fem_cuda.so \
+        --with guests/fem_cuda.so,steps=1 --with guests/mpm_cuda.so --with guests/mpm_cuda.so,labels=0 \
+        --with guests/tets_cuda.so,steps=80 --with guests/tets_cuda.so,steps=640 --iterations 32,128 \
+        --truth guests/fem_cuda.so,newton=2 --truth-particles 400000 --json "$results/methods.json" ;;
     sanitizer)
       for tool in memcheck racecheck initcheck synccheck; do
         # Kernels one by one, because racecheck does not support conditional nodes. From one thread, because racecheck
