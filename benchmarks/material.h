@@ -12,8 +12,8 @@ namespace cutproof::benchmarks {
 
 struct BarSpec {
   std::string along = "100";  // its axis in the grid: 100 (a square section), 110 or 111 (round ones)
-  Cooking cooking = Cooking::boxes;
-  int32_t side = 5;  // of the cores of clusters
+  Cooking cooking = Cooking::tiles;
+  int32_t side = 2;  // of clusters
   double poisson_ratio = 0;
   int32_t across = 10;     // nodes; it is kSlenderness times as long
   int32_t iterations = 0;  // of a substep; 0: as many as leave a thousandth of a long wave's error

@@ -60,10 +60,10 @@ struct MaterialSpec {
   friend bool operator==(const MaterialSpec&, const MaterialSpec&) = default;
 };
 
-enum class Cooking { boxes, sampled };
+enum class Cooking { boxes, sampled, tiles };
 struct ClusterSpec {
   Cooking method = Cooking::boxes;
-  int32_t side = 5;      // boxes: c, nodes per side of a core
+  int32_t side = 5;      // boxes: c, nodes per side of a core; tiles: edges per side
   double spacing = 3.0;  // sampled: distance within which a seed covers particles [h]
   double radius = 4.0;   // sampled: radius of the balls [h]
   double small = 0.5;    // tau = small · median size at cooking
@@ -165,7 +165,7 @@ struct Scene {
 // Names in files, in the order of the enumerators; those of the other choices are in model/rules.h.
 inline constexpr std::array<std::string_view, 9> kShapeNames = {"box",    "ball",  "cylinder", "capsule",   "torus",
                                                                 "kidney", "liver", "union",    "difference"};
-inline constexpr std::array<std::string_view, 2> kCookingNames = {"boxes", "sampled"};
+inline constexpr std::array<std::string_view, 3> kCookingNames = {"boxes", "sampled", "tiles"};
 inline constexpr std::array<std::string_view, 2> kCurveNames = {"line", "arc"};
 inline constexpr std::array<std::string_view, 2> kDetectEveryNames = {"frame", "substep"};
 

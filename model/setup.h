@@ -11,8 +11,8 @@
 
 namespace cutproof {
 
-enum class Solver { implicit, published };                   // method.md §3
-enum class Acceleration { none, chebyshev };                 // of the implicit solver, method.md §11
+enum class Solver : int16_t { implicit, published };         // method.md §3
+enum class Acceleration : int16_t { none, chebyshev };       // of the implicit solver, method.md §11
 enum class Criterion { none, distance, geometric, strain };  // method.md §4; none: nothing is ever removed
 enum class RemovedEnds { both, one, nearer };                // of an edge that is too long, method.md §4
 enum class MergeRule { none, deterministic, published };     // method.md §6

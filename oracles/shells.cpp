@@ -88,7 +88,7 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
   const WeightedRest weighted = weighted_rest(body, clusters);
   const double u = unit_roundoff(state) + kUnitRoundoff;
   std::vector<ClusterMeans> means;
-  std::vector<Mat3> maps = clusters.rotation;
+  std::vector<Mat3> maps = clusters.rotation, carry = maps;  // of owners, of points beside them
   std::vector<VolumeTarget> volumes;
   std::vector<double> volume_rounding;  // of V A0^(1/2), times its share
   std::vector<double> volume_absolute;  // of it, by absolute coordinates: at most
@@ -136,27 +136,34 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
       const double far_at_rest = a0.trace() > 0 ? sums + (2 * p * lengths_at_rest + of_centers) / a0.trace() : sums;
       volume_rounding.push_back(part * volumes.back().rounding(off, sums, u));
       volume_absolute.push_back(part * volumes.back().rounding(far, far_at_rest, u) - volume_rounding.back());
-      lengthens = std::max(1.0, 1 - part + part * as_eigen(volumes.back().v).norm());
-      maps[at(c)] = volumes.back().map(part, maps[at(c)]);
+      const Mat3& r = clusters.rotation[at(c)];
+      carry[at(c)] = volumes.back().carry_map(part, r);
+      maps[at(c)] = volumes.back().goal_map(part, r);
+      lengthens = std::max(1.0, as_eigen(maps[at(c)]).norm());
     }
     absolute.push_back((1 + lengthens) * of_mean);  // of the deformed center, and of the arm from that at rest
   }
   std::vector<VertexPlace> places(skin.owner.size());
   for (std::size_t v = 0; v < places.size(); ++v) {
     const Vec3 rest = vertex_at_rest(setup, skin, v);
-    const auto holders = memberships.of(skin.owner[v]);
+    const int32_t owner = skin.owner[v];
+    const Vec3 owner_at_rest = body.rest_position(owner), beside = rest - owner_at_rest;
+    const double own = setup.step.volume_share;
+    const auto holders = memberships.of(owner);
     Vec3 sum, first;
     double squares = 0, terms = 0;  // of single clusters; how far they are from the first
     double at_most = 0;
     for (const int32_t c : holders) {
       const ClusterMeans& m = means[at(c)];
-      const Vec3 arm = rest - m.rest, goal = m.current + maps[at(c)] * arm;
+      const Vec3 arm = owner_at_rest - m.rest;
+      const Vec3 goal = own * state.x[at(owner)] + (1 - own) * m.current + maps[at(c)] * arm + carry[at(c)] * beside;
       if (c == holders.front()) first = goal;
       sum += goal;
       terms += norm(goal - first);
-      squares += center_rounding[at(c)] + 4 * u * u * dot(arm, arm);
+      squares += center_rounding[at(c)] + 4 * u * u * (dot(arm, arm) + dot(beside, beside));
       if (!volumes.empty()) {
-        const double lever = volumes[at(c)].lever(arm), off = volume_rounding[at(c)] * lever;
+        const double lever = volumes[at(c)].lever(arm) + volumes[at(c)].lever(beside),
+                     off = volume_rounding[at(c)] * lever;
         squares += off * off;
         at_most += volume_absolute[at(c)] * lever;
       }
@@ -166,11 +173,12 @@ std::vector<VertexPlace> vertex_places(const Setup& setup, const State& state, c
     // Partial sums of terms that are as large as their mean: u² q² (1² + … + n²) / 3n².
     squares += count * u * u * terms * terms / 9;
     const Vec3 place = sum / count, kept = state.precision == Precision::binary32 ? place - rest : place;
-    const double in_doubles = 4 * kUnitRoundoff * norm(place);
-    squares = squares / (count * count) + u * u * dot(kept, kept) + in_doubles * in_doubles;
+    const double in_doubles = 4 * kUnitRoundoff * norm(place),
+                 from_owner = 2 * u * own * norm(state.x[at(owner)] - place);
+    squares = squares / (count * count) + u * u * dot(kept, kept) + in_doubles * in_doubles + from_owner * from_owner;
     // Of the mean of the clusters' answers, whose weights are equal; and where it rests.
     const double of_answers = absolute_mean_rounding(state, (count + 1) / 2);
-    places[v] = {place, kDeviations * std::sqrt(squares) + at_most / count + of_answers};
+    places[v] = {place, kDeviations * std::sqrt(squares) + at_most / count + of_answers + own * state.place_rounding};
   }
   return places;
 }

@@ -131,6 +131,7 @@ VolumeTarget volume_target(const Mat3& a, const Mat3& rest_moment, const Mat3& r
                            const Mat3* towards) {
   VolumeTarget target;
   target.v = rotation;
+  target.from_f.m.fill(0);
   target.inverse_root.m.fill(0);
   const Matrix moved = as_eigen(a).cast<Real>(), r = as_eigen(rotation).cast<Real>();
   const Eigen::SelfAdjointEigenSolver<Matrix> rest(as_eigen(rest_moment).cast<Real>());
@@ -156,6 +157,7 @@ VolumeTarget volume_target(const Mat3& a, const Mat3& rest_moment, const Mat3& r
     w = nearest_product(g, std::sqrt(extent.prod()),
                         as_eigen(towards != nullptr ? *towards : rotation).cast<Real>() * root, tie, target);
     v = w * inverse_root;
+    target.from_f = to_mat3(((w - g) * inverse_root).cast<double>());
     // The conditions of the answer: its determinant, and (V A0 - A) Vᵀ = μ I.
     const Matrix condition = (w - g) * w.transpose();
     const Real size = w.norm() + g.norm();
@@ -178,17 +180,22 @@ VolumeTarget volume_target(const Mat3& a, const Mat3& rest_moment, const Mat3& r
 
 double VolumeTarget::rounding(double off, double sums, double u) const {
   const double of_moments = (off + sums * stretch) * thinness;
-  const double found = growth * (of_moments + kRounds * u * size);
+  const double found = (growth + 1) * (of_moments + kRounds * u * size);
   // Nearer to a tie a backend chooses.
   const bool is_sure = is_flat || (gap > degenerate_rounds(u) * u && lead > 4 * (of_moments + kRounds * u * size));
   const bool is_decided = found < size / 8 && is_sure;
   return is_decided ? found : 2 * size;
 }
 
-Mat3 VolumeTarget::map(double volume_share, const Mat3& r) const {
-  Mat3 b;
-  for (std::size_t k = 0; k < 9; ++k) b.m[k] = (1 - volume_share) * r.m[k] + volume_share * v.m[k];
-  return b;
+namespace {
+Mat3 mean_of(double share, const Mat3& r, const Mat3& towards) {
+  Mat3 mean;
+  for (std::size_t k = 0; k < 9; ++k) mean.m[k] = (1 - share) * r.m[k] + share * towards.m[k];
+  return mean;
 }
+}  // namespace
+
+Mat3 VolumeTarget::goal_map(double volume_share, const Mat3& r) const { return mean_of(volume_share, r, from_f); }
+Mat3 VolumeTarget::carry_map(double volume_share, const Mat3& r) const { return mean_of(volume_share, r, v); }
 
 }  // namespace cutproof::oracles

@@ -7,6 +7,7 @@ namespace cutproof::oracles {
 
 struct VolumeTarget {
   Mat3 v;
+  Mat3 from_f;        // V - F, with F = A A0⁻¹; of a flat cluster 0
   Mat3 inverse_root;  // A0^(-1/2), without the directions in which a flat cluster has no extent
   bool is_flat = false;
   // Flat but for extents that rounding cannot make: then R across them is not the minimum of an energy.
@@ -20,13 +21,13 @@ struct VolumeTarget {
   double stretch = 0;   // ‖F‖ · tr A0
   double thinness = 0;  // greatest entry of A0^(-1/2) along its axes
 
-  // How far at most rounding puts V A0^(1/2), if A is off by `off`, sums round by `sums`, and numbers by `u`. An open
-  // answer may be anywhere.
+  // How far at most rounding puts V A0^(1/2), and (V - F) A0^(1/2), if A is off by `off`, sums round by `sums`, and
+  // numbers by `u`. An open answer may be anywhere.
   double rounding(double off, double sums, double u) const;
   bool is_open(double off, double sums, double u) const { return size > 0 && !(rounding(off, sums, u) < size / 8); }
-  // (1 - β) R + β V
-  Mat3 map(double volume_share, const Mat3& r) const;
-  // By so much a change of V A0^(1/2) moves a member at `arm` at most.
+  Mat3 goal_map(double volume_share, const Mat3& r) const;   // C = (1 - β) R + β (V - F)
+  Mat3 carry_map(double volume_share, const Mat3& r) const;  // B = (1 - β) R + β V
+  // By so much a change of one of them times A0^(1/2) moves a member at `arm` at most.
   double lever(Vec3 arm) const { return norm(inverse_root * arm); }
 };
 

@@ -306,7 +306,9 @@ Instance instance_of(const Case& c) {
     loaded.state = fixtures::foreign_state(setup.body, connected_cover(setup.body, c.most, c.seed), c.tau, c.cap);
   } else {
     ClusterSpec spec;
-    spec.method = c.clusters == ClusterKind::boxes ? Cooking::boxes : Cooking::sampled;
+    spec.method = c.clusters == ClusterKind::boxes     ? Cooking::boxes
+                  : c.clusters == ClusterKind::sampled ? Cooking::sampled
+                                                       : Cooking::tiles;
     spec.side = c.side;
     spec.spacing = c.seed_spacing / 4.0;
     spec.radius = c.ball_radius / 4.0;

@@ -341,7 +341,7 @@ Case draw_case(uint64_t seed, int size) {
   c.nodes.erase(std::unique(c.nodes.begin(), c.nodes.end()), c.nodes.end());
   c.spacing = random.pick({1.0, 0.003});
 
-  c.clusters = random.pick({ClusterKind::boxes, ClusterKind::sampled, ClusterKind::foreign});
+  c.clusters = random.pick({ClusterKind::boxes, ClusterKind::sampled, ClusterKind::foreign, ClusterKind::tiles});
   c.side = random.between(1, 6);
   c.seed_spacing = random.between(2, 14);
   c.ball_radius = random.between(4, 18);

@@ -13,6 +13,7 @@ namespace cutproof::property_tests {
 
 NLOHMANN_JSON_SERIALIZE_ENUM(ClusterKind, {{ClusterKind::boxes, "boxes"},
                                            {ClusterKind::sampled, "sampled"},
+                                           {ClusterKind::tiles, "tiles"},
                                            {ClusterKind::foreign, "foreign"}})
 NLOHMANN_JSON_SERIALIZE_ENUM(Link, {{Link::apart, "apart"}, {Link::chained, "chained"}, {Link::retraced, "retraced"}})
 NLOHMANN_JSON_SERIALIZE_ENUM(Removal, {{Removal::usual, "usual"},

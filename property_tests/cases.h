@@ -21,7 +21,7 @@ namespace cutproof::property_tests {
 using Node = std::array<int32_t, 3>;
 using Quarters = std::array<int32_t, 3>;  // a point: 4·i is node i of the case
 
-enum class ClusterKind { boxes, sampled, foreign };
+enum class ClusterKind { boxes, sampled, foreign, tiles };
 enum class Link { apart, chained, retraced };  // chained: begins where the last stroke ended; retraced: runs it back
 // Criterion of removal; usual: distance where the body moves, geometric where nothing does.
 enum class Removal { usual, geometric, strain };

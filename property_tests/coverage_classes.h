@@ -20,6 +20,7 @@ inline constexpr std::array kCoverageClasses = {
     CoverageClass{"several components"},  // already before the first cut
     CoverageClass{"boxes"},
     CoverageClass{"sampled clusters"},
+    CoverageClass{"tiles"},
     CoverageClass{"foreign clusters"},
     CoverageClass{"removal"},  // a cut took particles out
     CoverageClass{"miss"},     // a frame with the blade down removed nothing

@@ -30,6 +30,7 @@ void note_what_is_given(const Case& c, const Instance& loaded, CaseCoverage& see
   seen["one particle"] = n == 1;
   seen["boxes"] = c.clusters == ClusterKind::boxes;
   seen["sampled clusters"] = c.clusters == ClusterKind::sampled;
+  seen["tiles"] = c.clusters == ClusterKind::tiles;
   seen["foreign clusters"] = c.clusters == ClusterKind::foreign;
   seen["blade of thickness 0"] = c.blade_thickness == 0 && !c.strokes.empty();
   for (const Stroke& stroke : resolved_strokes(c)) {

@@ -84,6 +84,9 @@ std::string in_words(const Case& c) {
     case ClusterKind::boxes:
       text += fmt::format(" in boxes of {} a side", counted(c.side, "node", "nodes"));
       break;
+    case ClusterKind::tiles:
+      text += fmt::format(" in tiles of {} a side", counted(c.side, "edge", "edges"));
+      break;
     case ClusterKind::sampled:
       text += fmt::format(" in balls of {:g} h, {:g} h apart", spacings(c.ball_radius), spacings(c.seed_spacing));
       break;

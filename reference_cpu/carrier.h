@@ -27,10 +27,11 @@ inline std::vector<Vec3> current_centers(const Body& body, const State& state, c
   return centers;
 }
 
-// The linear map of each cluster's goals: R_c of the state, and V_c of its positions.
-inline std::vector<Mat3> current_maps(const Setup& setup, const State& state, const Memberships& memberships,
-                                      const std::vector<Vec3>& centers) {
-  std::vector<Mat3> maps = state.clusters.rotation;
+// The maps of each cluster: by R_c of the state, and by V_c and F_c of its positions.
+inline std::vector<ClusterMaps> current_maps(const Setup& setup, const State& state, const Memberships& memberships,
+                                             const std::vector<Vec3>& centers) {
+  std::vector<ClusterMaps> maps;
+  for (const Mat3& r : state.clusters.rotation) maps.push_back({r, r});
   if (setup.step.volume_share == 0) return maps;
   for (int32_t c = 0; c < state.clusters.count(); ++c) {
     if (state.clusters.size(c) == 1) continue;  // A0 would be the rounding of T
@@ -48,7 +49,7 @@ inline std::vector<Mat3> current_maps(const Setup& setup, const State& state, co
         }
       }
     }
-    maps[at(c)] = goal_map(setup.step.volume_share, a, a0, maps[at(c)]);
+    maps[at(c)] = cluster_maps(setup.step.volume_share, a, a0, state.clusters.rotation[at(c)]);
   }
   return maps;
 }
@@ -59,6 +60,7 @@ class Carrier {
   Carrier(const Setup& setup, const State& state)
       : body_(setup.body),
         state_(state),
+        volume_share_(setup.step.volume_share),
         memberships_(memberships_of(state.clusters, setup.body.particle_count())),
         centers_(current_centers(setup.body, state, memberships_)),
         maps_(current_maps(setup, state, memberships_, centers_)) {}
@@ -67,23 +69,26 @@ class Carrier {
     const double far = reach * body_.grid.spacing;
     const auto& e = kDirections[at(direction)];
     const Vec3 offset = {far * e[0], far * e[1], far * e[2]};
-    const Vec3 rest = body_.rest_position(owner) + offset;
+    const Vec3 rest = body_.rest_position(owner);
     Vec3 sum;
     for (const int32_t cluster : memberships_.of(owner)) {
       const std::size_t c = at(cluster);
-      sum += centers_[c] + maps_[c] * (rest - state_.clusters.rest_center[c]);
+      sum += (1 - volume_share_) * centers_[c] + maps_[c].goal * (rest - state_.clusters.rest_center[c]) +
+             maps_[c].carry * offset;
     }
     // An owner without a cluster breaks I2. Its points then move with it, unrotated.
     const auto count = memberships_.count(owner);
-    return count > 0 ? sum / static_cast<double>(count) : state_.x[at(owner)] + offset;
+    if (count == 0) return state_.x[at(owner)] + offset;
+    return volume_share_ * state_.x[at(owner)] + sum / static_cast<double>(count);
   }
 
  private:
   const Body& body_;
   const State& state_;
+  double volume_share_;
   Memberships memberships_;
   std::vector<Vec3> centers_;
-  std::vector<Mat3> maps_;
+  std::vector<ClusterMaps> maps_;
 };
 
 }  // namespace cutproof::reference

@@ -53,13 +53,15 @@ struct Rotation {
 };
 Rotation closest_rotation(const Mat3& a, const Mat3& previous);
 
-// V of a cluster (method.md §3, Volume), given A, A0 and R: of the matrices of determinant 1 the nearest to F = A A0⁻¹
-// in the norm of A0. Of several the nearest to R. A flat cluster has no volume: F along its extent, and R across it.
-// Requires A0 symmetric and not negative.
-Mat3 closest_volume(const Mat3& a, const Mat3& rest_moment, const Mat3& rotation);
-
-// The linear map by which a cluster places its members: (1 - β) R + β V.
-Mat3 goal_map(double volume_share, const Mat3& a, const Mat3& rest_moment, const Mat3& rotation);
+// The linear maps of a cluster of several members (method.md §3, Volume), given A, A0 and R. F = A A0⁻¹; V is the
+// nearest to it of the matrices of determinant 1, in the norm of A0, and of several the nearest to R. A flat cluster
+// has no volume: V is F along its extent and R across it, and V - F counts as 0. Requires A0 symmetric and not
+// negative.
+struct ClusterMaps {
+  Mat3 goal;   // C = (1 - β) R + β (V - F): from the rest centre to where members are wanted
+  Mat3 carry;  // B = (1 - β) R + β V: of points beside a member
+};
+ClusterMaps cluster_maps(double volume_share, const Mat3& a, const Mat3& rest_moment, const Mat3& rotation);
 
 // method.md §6 on any family of sets (each strictly ascending), overlapping or not: a set with fewer than tau
 // particles is small. `numbers` are distinct. Does not touch rest frames. `rule` must not be none.

@@ -10,7 +10,7 @@ namespace cutproof::reference {
 
 namespace {
 
-// t_c and the goals' linear map of one cluster at positions x.
+// t_c and C_c of one cluster at positions x.
 struct Pose {
   Vec3 center;
   Mat3 map;
@@ -111,24 +111,25 @@ std::vector<Pose> match_shapes(const Body& body, double volume_share, const Memb
     }
     const Rotation best = closest_rotation(a, clusters.rotation[at(c)]);
     // Of one particle A0 is the rounding of T.
-    pose.map = clusters.size(c) > 1 ? goal_map(volume_share, a, a0, best.r) : best.r;
+    pose.map = clusters.size(c) > 1 ? cluster_maps(volume_share, a, a0, best.r).goal : best.r;
     // Otherwise it would push the cluster, and change the body's momentum, in every iteration.
-    pose.center += (moment - pose.map * rest_moment) / clusters.mass[at(c)];
+    pose.center += (moment - pose.map * rest_moment / (1 - volume_share)) / clusters.mass[at(c)];
     clusters.rotation[at(c)] = best.r;
     clusters.degenerate[at(c)] = best.degenerate;
   }
   return poses;
 }
 
-// g_i: the mean of the positions that its clusters demand of particle i. A particle in no cluster has its own place.
-Vec3 goal(const Body& body, const Memberships& memberships, const Clusters& clusters, const std::vector<Pose>& poses,
-          int32_t i, Vec3 x) {
+// g_i = β x_i + mean of (1 - β) t_c + C_c (X_i - T_c) over its clusters. A particle in no cluster has its own place.
+Vec3 goal(const Body& body, double volume_share, const Memberships& memberships, const Clusters& clusters,
+          const std::vector<Pose>& poses, int32_t i, Vec3 x) {
   if (memberships.count(i) == 0) return x;
   Vec3 sum;
   for (const int32_t c : memberships.of(i)) {
-    sum += poses[at(c)].center + poses[at(c)].map * (body.rest_position(i) - clusters.rest_center[at(c)]);
+    const Vec3 arm = body.rest_position(i) - clusters.rest_center[at(c)];
+    sum += (1 - volume_share) * poses[at(c)].center + poses[at(c)].map * arm;
   }
-  return sum / static_cast<double>(memberships.count(i));
+  return volume_share * x + sum / static_cast<double>(memberships.count(i));
 }
 
 void substep(const Setup& setup, const Memberships& memberships, int64_t index, int32_t iterations, double dt,
@@ -175,7 +176,7 @@ void substep(const Setup& setup, const Memberships& memberships, int64_t index, 
     Vec3 pushed_now;
     for (int32_t i = 0; i < n; ++i) {
       if (!state.alive[at(i)]) continue;
-      const Vec3 g = goal(body, memberships, state.clusters, poses, i, now[at(i)]);
+      const Vec3 g = goal(body, parameters.volume_share, memberships, state.clusters, poses, i, now[at(i)]);
       const Vec3 from = implicit ? predicted_ahead[at(i)] : now[at(i)];
       const Vec3 plain_ahead = from + s * (g - from);
       const Vec3 free_ahead = accelerated ? chebyshev.combine(plain_ahead, now[at(i)], earlier[at(i)]) : plain_ahead;

@@ -98,14 +98,16 @@ class NearestProduct {
   const double product_;
 };
 
-}  // namespace
-
-Mat3 closest_volume(const Mat3& a, const Mat3& rest_moment, const Mat3& rotation) {
+// V, and its distance from F.
+struct Kept {
+  Matrix v, from_f;
+};
+Kept keep_volume(const Mat3& a, const Mat3& rest_moment, const Mat3& rotation) {
   const Eigen::SelfAdjointEigenSolver<Matrix> rest(as_matrix(rest_moment));
   const Vector& extent = rest.eigenvalues();  // ascending
   const Matrix axes = rest.eigenvectors(), moved = as_matrix(a), r = as_matrix(rotation);
-  if (!moved.allFinite()) return rotation;
-  Matrix v;
+  Kept kept = {r, Matrix::Zero()};
+  if (!moved.allFinite()) return kept;
   if (extent.prod() > kFlatVolume * std::pow(extent.sum(), 3)) {
     const Matrix root = axes * extent.cwiseSqrt().asDiagonal() * axes.transpose();
     const Matrix inverse = axes * extent.cwiseSqrt().cwiseInverse().asDiagonal() * axes.transpose();
@@ -121,28 +123,34 @@ Mat3 closest_volume(const Mat3& a, const Mat3& rest_moment, const Mat3& rotation
     if (d.sigma[1] + d.sigma[2] <= same || (is_collapsed && d.sigma[1] - d.sigma[2] <= same)) {
       d = decompose(g + kPull * std::max(d.sigma[0] / root.norm(), kSame) * r * root);
     }
-    v = d.u * p.asDiagonal() * d.z.transpose() * inverse;
+    kept.v = d.u * p.asDiagonal() * d.z.transpose() * inverse;
+    kept.from_f = kept.v - g * inverse;
   } else {
     Vector inverse = Vector::Zero();
     for (int k = 0; k < 3; ++k) {
       if (extent[k] > kFlatExtent * extent[2]) inverse[k] = 1 / extent[k];
     }
     const Matrix along = axes * inverse.cwiseSign().asDiagonal() * axes.transpose();
-    v = moved * (axes * inverse.asDiagonal() * axes.transpose()) + r * (Matrix::Identity() - along);
+    kept.v = moved * (axes * inverse.asDiagonal() * axes.transpose()) + r * (Matrix::Identity() - along);
   }
+  return kept;
+}
+
+Mat3 from_matrix(const Matrix& m) {
   Mat3 result;
   for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) result(row, column) = v(row, column);
+    for (int column = 0; column < 3; ++column) result(row, column) = m(row, column);
   }
   return result;
 }
 
-Mat3 goal_map(double volume_share, const Mat3& a, const Mat3& rest_moment, const Mat3& rotation) {
-  if (volume_share == 0) return rotation;
-  const Mat3 v = closest_volume(a, rest_moment, rotation);
-  Mat3 b;
-  for (std::size_t k = 0; k < 9; ++k) b.m[k] = (1 - volume_share) * rotation.m[k] + volume_share * v.m[k];
-  return b;
+}  // namespace
+
+ClusterMaps cluster_maps(double volume_share, const Mat3& a, const Mat3& rest_moment, const Mat3& rotation) {
+  if (volume_share == 0) return {rotation, rotation};
+  const Kept kept = keep_volume(a, rest_moment, rotation);
+  const Matrix turned = (1 - volume_share) * as_matrix(rotation);
+  return {from_matrix(turned + volume_share * kept.from_f), from_matrix(turned + volume_share * kept.v)};
 }
 
 }  // namespace cutproof::reference

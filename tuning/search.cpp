@@ -123,7 +123,7 @@ class Searcher {
     const auto resize = [&](bool larger) {
       return attempt_with([&](Configuration& c) {
         ClusterSpec& clusters = c.scene.clusters;
-        if (clusters.method == Cooking::boxes) {
+        if (clusters.method != Cooking::sampled) {
           return set(clusters.side, std::max<int32_t>(1, clusters.side + (larger ? 1 : -1)));
         }
         const double factor = larger ? 1.25 : 0.8;

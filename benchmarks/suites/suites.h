@@ -94,10 +94,10 @@ nlohmann::json run_baselines(const BaselinesOptions& options, const Progress& pr
 struct MaterialOptions {
   std::string backend = harness::kReferenceName;
   std::vector<std::string> along = {"100"};
-  std::vector<std::string> cooking = {"boxes"};
-  std::vector<int32_t> sides = {2, 5};
+  std::vector<std::string> cooking = {"tiles"};
+  std::vector<int32_t> sides = {1, 2};
   std::vector<double> poisson_ratios = {0, 0.45};
-  std::vector<int32_t> across = {10};
+  std::vector<int32_t> across = {11};
   std::vector<int32_t> iterations = {2, 4, 8};  // a row each, of bars along 100
 };
 nlohmann::json run_material(const MaterialOptions& options, const Progress& progress);

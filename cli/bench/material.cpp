@@ -23,8 +23,8 @@ void add_material(CLI::App& bench, Work& work) {
       "material", "bars of a material that hang, stretch, twist, bend and swing, beside closed forms");
   add_backend_name(*command, options->backend, "backend under test", is_timed);
   add_list(*command, "--along", options->along, "axes of bars in the grid: 100, 110, 111", "A");
-  add_list(*command, "--clusters", options->cooking, "methods of cooking: boxes, sampled", "C");
-  add_list(*command, "--sides", options->sides, "nodes of a cluster's core along a side", "N");
+  add_list(*command, "--clusters", options->cooking, "methods of cooking: tiles, boxes, sampled", "C");
+  add_list(*command, "--sides", options->sides, "side of clusters: edges of a tile, nodes of a core", "N");
   add_list(*command, "--poisson-ratio", options->poisson_ratios, "Poisson's ratios", "NU");
   add_list(*command, "--across", options->across, "nodes across a bar", "N");
   add_list(*command, "--iterations", options->iterations, "few iterations, a row each", "K");

@@ -22,14 +22,8 @@ void by_volume(bool keeps_volume, Start start) {
     start(std::false_type{});
   }
 }
-// For kernels that carry points: clusters of a load that keeps volume carry them by their whole map.
-inline DeviceView with_carried_maps(const DeviceView& w) {
-  DeviceView carrying = w;
-  if (w.keeps_volume != 0) carrying.rotation = w.carried_map;
-  return carrying;
-}
 
-// DeviceView::center of a cluster from the present displacements, and its carried_map.
+// DeviceView::center of a cluster from the present displacements, and its member_map and beside_map.
 template <bool kVolume, class Block>
 CUTPROOF_DEVICE void recenter(const DeviceView& w, const Team<Block, kCenterTeam>& team, int s) {
   const BodyConstants& body = w.body[w.slot_body[s]];
@@ -81,8 +75,9 @@ CUTPROOF_DEVICE void recenter(const DeviceView& w, const Team<Block, kCenterTeam
     });
     const auto of = team.total(products);
     if (!team.leads()) return;
-    Matrix3 map = w.rotation[s];
-    turned = map * rest - rest;
+    const Matrix3 r = w.rotation[s];
+    Matrix3 member = r, beside = r;
+    turned = r * rest - rest;
     if (body.volume_share > 0 && w.slot_size[s] > 1) {  // of one particle A0 is rounding
       const float per_h = 1.0f / body.h;
       const float a0[3][3] = {
@@ -92,11 +87,17 @@ CUTPROOF_DEVICE void recenter(const DeviceView& w, const Team<Block, kCenterTeam
         const float mean = moved[row] / total.v[6];
         for (int k = 0; k < 3; ++k) change(row, k) = per_h * (of.v[3 * row + k] - mean * (per_h * rest[k]));
       }
-      map = goal_map(body.volume_share, a0, change, map);
-      turned = map * rest;
-      for (int k = 0; k < 9; k += 4) map.m[k] += 1.0f;
+      const VolumeMaps maps = volume_maps(a0, change, r);
+      member = map_towards(body.volume_share, maps.pull, r);
+      beside = map_towards(body.volume_share, maps.target, r);
+      turned = (1.0f / (1.0f - body.volume_share)) * (member * rest);
+      for (int k = 0; k < 9; k += 4) {
+        member.m[k] += 1.0f;
+        beside.m[k] += 1.0f;
+      }
     }
-    w.carried_map[s] = map;
+    w.member_map[s] = member;
+    w.beside_map[s] = beside;
   } else {
     if (!team.leads()) return;
     turned = w.rotation[s] * rest - rest;
@@ -104,17 +105,19 @@ CUTPROOF_DEVICE void recenter(const DeviceView& w, const Team<Block, kCenterTeam
   w.center[s] = base + (1.0f / total.v[6]) * (moved - turned);
 }
 
-// The mean over p's clusters of (t - T) + (R - I)(X - T) for a point that rests at X = X_p + arm, as displacement from
-// X. Without a cluster p's displacement.
+// Displacement of a point that rests at X_p + arm: β d_p, and the mean over p's clusters of (1 - β)(t - T) +
+// (C - (1 - β) I)(X_p - T) + (B - I) arm. Where β = 0, both maps are R - I. Without a cluster p's displacement.
+template <bool kVolume>
 CUTPROOF_DEVICE inline Float3 carried(const DeviceView& w, const BodyConstants& body, int p, Float3 arm) {
   // Relative to where the first cluster puts the point, so that summing costs no digits of d. (A blade may have pushed
   // the owner far from where its clusters put the point.)
-  Float3 base = xyz(w.displacement[p]), sum;
+  const Float3 own = xyz(w.displacement[p]);
+  Float3 base = own, sum;
   const Coordinates at = coordinates(body, w.node[p]);
   struct Holder {
     RestCenter rest;
     Float3 center;
-    Matrix3 rotation;
+    Matrix3 member, beside;
   };
   // Several at once: one by one, each read would wait for the previous one.
   constexpr int kAtOnce = 4;
@@ -123,12 +126,19 @@ CUTPROOF_DEVICE inline Float3 carried(const DeviceView& w, const BodyConstants& 
     Holder holder[kAtOnce];
     for (int t = 0; t < kAtOnce; ++t) {
       const int s = w.memberships[begin + (first + t < clusters ? first + t : first)];
-      holder[t] = {rest_center(w, s), w.center[s], w.rotation[s]};
+      holder[t] = {rest_center(w, s), w.center[s], kVolume ? w.member_map[s] : w.rotation[s], {}};
+      if constexpr (kVolume) holder[t].beside = w.beside_map[s];
     }
     for (int t = 0; t < kAtOnce; ++t) {
       if (first + t >= clusters) break;
-      const Float3 r = body.h * nodes_between(holder[t].rest, at) + arm;
-      const Float3 center = holder[t].center, turned = holder[t].rotation * r - r;
+      Float3 r = body.h * nodes_between(holder[t].rest, at), center = holder[t].center;
+      const bool keeps_volume = kVolume && body.volume_share > 0;
+      if (!keeps_volume) r = r + arm;
+      Float3 turned = holder[t].member * r - r;
+      if (keeps_volume) {
+        turned = turned + (holder[t].beside * arm - arm);
+        center = center + body.volume_share * (own - center);
+      }
       if (first + t == 0) base = center + turned;
       sum = sum + ((center - base) + turned);
     }

@@ -87,7 +87,8 @@ CUTPROOF_DEVICE inline bool is_negative(const DeviceView& w, const BodyConstants
 
 // Distance from the plane to which the clusters carry a particle.
 CUTPROOF_DEVICE inline float carried_from(const DeviceView& w, const BodyConstants& body, const Plane& plane, int p) {
-  return fabsf(height_over(plane, rest_position(body, w.node[p]) + carried(w, body, p, {0, 0, 0})));
+  const Float3 d = w.keeps_volume != 0 ? carried<true>(w, body, p, {}) : carried<false>(w, body, p, {});
+  return fabsf(height_over(plane, rest_position(body, w.node[p]) + d));
 }
 
 // Of an edge across the plane, by the nearer end: whether its end on the negative side is removed. Both ends ask with
@@ -567,7 +568,7 @@ void enqueue_detect(Launcher& launcher, const DeviceView& w, const Plan& plan) {
         launcher.teams(recenter_asked_clusters_kernel_object<volume.value>{}, kCenterTeam, w.slots_expected, w);
       });
     }
-    launcher.items(remove_particles_kernel_object<nearer.value>{}, w.particles, with_carried_maps(w));
+    launcher.items(remove_particles_kernel_object<nearer.value>{}, w.particles, w);
   };
   if (plan.nearer) {
     by_ends(std::true_type{});

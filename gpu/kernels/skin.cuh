@@ -365,6 +365,7 @@ CUTPROOF_DEVICE inline float cut_reach(float owner, float end, float alpha) {
 }
 
 // Where the blade's plane crosses the edge, as p's clusters carry both; alpha without a blade.
+template <bool kVolume>
 CUTPROOF_DEVICE inline float reach_by_blade(const DeviceView& w, const BodyConstants& body, int b, int p,
                                             int direction) {
   const Plane plane = lowered_plane(w, body, b);
@@ -372,7 +373,7 @@ CUTPROOF_DEVICE inline float reach_by_blade(const DeviceView& w, const BodyConst
   float height[2] = {};
   CUTPROOF_ROLLED for (int end = 0; end < 2; ++end) {
     const Float3 arm = arm_of(body, direction, static_cast<float>(end));
-    height[end] = height_over(plane, rest_position(body, w.node[p]) + arm + carried(w, body, p, arm));
+    height[end] = height_over(plane, rest_position(body, w.node[p]) + arm + carried<kVolume>(w, body, p, arm));
   }
   return cut_reach(height[0] / body.h, height[1] / body.h, body.alpha);
 }
@@ -380,7 +381,7 @@ CUTPROOF_DEVICE inline float reach_by_blade(const DeviceView& w, const BodyConst
 }  // namespace skin_detail
 
 // Puts each vertex where its owner's clusters carry it, as displacement from X_v.
-template <class Block>
+template <bool kVolume, class Block>
 CUTPROOF_DEVICE void place_vertices_kernel(Block& block, const DeviceView& w, bool made) {
   if (made && w.counters->changing != 0) return;
   for (int64_t v = block.first(); v < w.counters->vertices_used; v += block.stride()) {
@@ -392,21 +393,28 @@ CUTPROOF_DEVICE void place_vertices_kernel(Block& block, const DeviceView& w, bo
     const int direction = w.vertex_direction[v];
     float reach = w.vertex_reach[v];
     if (reach == kReachUnknown) {
-      reach = skin_detail::reach_by_blade(w, body, b, p, direction);
+      reach = skin_detail::reach_by_blade<kVolume>(w, body, b, p, direction);
       w.vertex_reach[v] = reach;
     }
-    w.vertex_position[v] = with_w(carried(w, body, p, skin_detail::arm_of(body, direction, reach)), 0.0f);
+    w.vertex_position[v] = with_w(carried<kVolume>(w, body, p, skin_detail::arm_of(body, direction, reach)), 0.0f);
   }
 }
-CUTPROOF_KERNEL(place_vertices_kernel);
+template <bool kVolume>
+struct place_vertices_kernel_object {
+  static constexpr const char* kName = "place_vertices_kernel";
+  template <class Block>
+  CUTPROOF_DEVICE void operator()(Block& block, const DeviceView& w, bool made) const {
+    place_vertices_kernel<kVolume>(block, w, made);
+  }
+};
 
 // made: as for the centres.
 template <class Launcher>
 void enqueue_skin_positions(Launcher& launcher, const DeviceView& w, bool made) {
   by_volume(w.keeps_volume != 0, [&](auto volume) {
     launcher.teams(recenter_clusters_kernel_object<volume.value>{}, kCenterTeam, w.slots_expected, w, made);
+    launcher.items(place_vertices_kernel_object<volume.value>{}, w.vertex_capacity, w, made);
   });
-  launcher.items(place_vertices_kernel_object{}, w.vertex_capacity, with_carried_maps(w), made);
 }
 
 }  // namespace cutproof::gpu

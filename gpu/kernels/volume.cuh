@@ -31,12 +31,17 @@ CUTPROOF_BOTH inline Float3 part_across(Float3 v, Float3 unit) { return v - dot(
 // U and Z are rotations, σ1 >= σ2 >= |σ3|. Where A determines no axis, U takes that of R.
 CUTPROOF_BOTH inline Svd svd_of(Float3 (&g)[3], const Matrix3& r) {
   constexpr int kSweeps = 5;
+  constexpr float kOrthogonal = 0x1p-42f;  // squared cosine: a turn by less moves V by less than rounding
   Svd svd = {{}, {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {}};
   Float3(&z)[3] = svd.z;
-  CUTPROOF_ROLLED for (int sweep = 0; sweep < kSweeps; ++sweep) {
+  bool turned = true;
+  CUTPROOF_ROLLED for (int sweep = 0; sweep < kSweeps && turned; ++sweep) {
+    turned = false;
     for (int pair = 0; pair < 3; ++pair) {
       const int p = pair == 2 ? 1 : 0, q = pair == 0 ? 1 : 2;
-      const float mixed = dot(g[p], g[q]), difference = dot(g[q], g[q]) - dot(g[p], g[p]);
+      const float mixed = dot(g[p], g[q]), of_p = dot(g[p], g[p]), of_q = dot(g[q], g[q]), difference = of_q - of_p;
+      if (mixed * mixed <= kOrthogonal * (of_p * of_q)) continue;
+      turned = true;
       const float denominator = fabsf(difference) + sqrtf(difference * difference + 4.0f * (mixed * mixed));
       const float t = denominator > 0 ? copysignf(2.0f, difference) * mixed / denominator : 0.0f;
       const float c = 1.0f / sqrtf(1.0f + t * t), s = t * c;
@@ -152,11 +157,17 @@ CUTPROOF_BOTH inline Matrix3 flat_map(const float (&a0)[3][3], const Matrix3& mo
 
 }  // namespace volume_detail
 
-// V - I of a cluster, given rest = A0 and change = A - A0: V is the matrix of determinant 1 nearest to F = A A0⁻¹, in
-// the norm of A0. Zero where `change` is zero.
-CUTPROOF_BOTH inline Matrix3 volume_map(const float (&rest)[3][3], const Matrix3& change, const Matrix3& r) {
+// V - F and V - I of a cluster. A flat one has V - F = 0.
+struct VolumeMaps {
+  Matrix3 pull = {{0, 0, 0, 0, 0, 0, 0, 0, 0}}, target = {{0, 0, 0, 0, 0, 0, 0, 0, 0}};
+};
+// Given rest = A0 and change = A - A0: V is the matrix of determinant 1 nearest to F = A A0⁻¹, in the norm of A0. All
+// are zero where `change` is zero.
+CUTPROOF_BOTH inline VolumeMaps volume_maps(const float (&rest)[3][3], const Matrix3& change, const Matrix3& r) {
   using namespace volume_detail;
-  Matrix3 v = {{0, 0, 0, 0, 0, 0, 0, 0, 0}}, moved = v;
+  VolumeMaps found;
+  Matrix3 turned = r, moved;
+  for (int k = 0; k < 9; k += 4) turned.m[k] -= 1.0f;
   const float trace = rest[0][0] + rest[1][1] + rest[2][2], scale = 1.0f / trace;
   float a0[3][3];
   bool is_moved = false;
@@ -173,11 +184,10 @@ CUTPROOF_BOTH inline Matrix3 volume_map(const float (&rest)[3][3], const Matrix3
   const float l22 = sqrtf(fmaxf(a0[2][2] - l20 * l20 - l21 * l21, 0.0f));
   const float product = l00 * l11 * l22;
   if (!(product * product > static_cast<float>(kFlatVolume))) {
-    if (trace > 0) return flat_map(a0, moved, r);
-    for (int k = 0; k < 9; ++k) v.m[k] = r.m[k] - (k % 4 == 0 ? 1.0f : 0.0f);
-    return v;
+    found.target = trace > 0 ? flat_map(a0, moved, r) : turned;
+    return found;
   }
-  if (!is_moved) return v;
+  if (!is_moved) return found;
   // G = F L = L + (A - A0) L⁻ᵀ, by columns.
   Float3 d[3];
   for (int k = 0; k < 3; ++k) d[k] = {moved(0, k), moved(1, k), moved(2, k)};
@@ -189,37 +199,43 @@ CUTPROOF_BOTH inline Matrix3 volume_map(const float (&rest)[3][3], const Matrix3
   const Product of = {{svd.sigma[0], svd.sigma[1], svd.sigma[2]}, 1.0f / product};
   // √(1 / 3) bounds the cube root of det L where the trace of A0 is 1.
   const float p3 = of.nearest(0.57736f);
-  // V L - L = (A - A0) L⁻ᵀ + U diag(p - σ) Zᵀ: small numbers where the strain is small.
+  // V L - G = U diag(p - σ) Zᵀ, and G - L: small numbers where the strain is small.
   const float off[3] = {of.mu(p3) / of.value(0, p3), of.mu(p3) / of.value(1, p3), p3 - svd.sigma[2]};
+  Float3 e[3] = {};
   for (int k = 0; k < 3; ++k) {
-    d[0] = d[0] + (off[k] * svd.z[k].x) * svd.u[k];
-    d[1] = d[1] + (off[k] * svd.z[k].y) * svd.u[k];
-    d[2] = d[2] + (off[k] * svd.z[k].z) * svd.u[k];
+    e[0] = e[0] + (off[k] * svd.z[k].x) * svd.u[k];
+    e[1] = e[1] + (off[k] * svd.z[k].y) * svd.u[k];
+    e[2] = e[2] + (off[k] * svd.z[k].z) * svd.u[k];
   }
-  d[2] = (1.0f / l22) * d[2];
-  d[1] = (1.0f / l11) * (d[1] - l21 * d[2]);
-  d[0] = (1.0f / l00) * (d[0] - (l10 * d[1] + l20 * d[2]));
+  const auto per_root = [&](Float3(&column)[3]) {  // times L⁻¹
+    column[2] = (1.0f / l22) * column[2];
+    column[1] = (1.0f / l11) * (column[1] - l21 * column[2]);
+    column[0] = (1.0f / l00) * (column[0] - (l10 * column[1] + l20 * column[2]));
+  };
+  per_root(d);
+  per_root(e);
   bool is_finite = true;
   for (int row = 0; row < 3; ++row) {
     for (int k = 0; k < 3; ++k) {
-      v(row, k) = d[k][row];
-      is_finite = is_finite && fabsf(d[k][row]) <= 3.0e38f;
+      found.pull(row, k) = e[k][row];
+      found.target(row, k) = d[k][row] + e[k][row];
+      is_finite = is_finite && fabsf(e[k][row]) <= 3.0e38f;
     }
   }
-  if (is_finite) return v;
-  for (int k = 0; k < 9; ++k) v.m[k] = r.m[k] - (k % 4 == 0 ? 1.0f : 0.0f);
-  return v;
+  if (is_finite) return found;
+  found.pull = {{0, 0, 0, 0, 0, 0, 0, 0, 0}};
+  found.target = turned;
+  return found;
 }
 
-// B - I = (1 - β) (R - I) + β (V - I).
-CUTPROOF_BOTH inline Matrix3 goal_map(float volume_share, const float (&rest)[3][3], const Matrix3& change,
-                                      const Matrix3& r) {
-  const Matrix3 v = volume_map(rest, change, r);
-  Matrix3 b;
+// (1 - β) (R - I) + β v. With v = V - F it is C - (1 - β) I, which moves members; with v = V - I it is B - I, which
+// moves points beside a member.
+CUTPROOF_BOTH inline Matrix3 map_towards(float volume_share, const Matrix3& v, const Matrix3& r) {
+  Matrix3 map;
   for (int k = 0; k < 9; ++k) {
-    b.m[k] = (1.0f - volume_share) * (r.m[k] - (k % 4 == 0 ? 1.0f : 0.0f)) + volume_share * v.m[k];
+    map.m[k] = (1.0f - volume_share) * (r.m[k] - (k % 4 == 0 ? 1.0f : 0.0f)) + volume_share * v.m[k];
   }
-  return b;
+  return map;
 }
 
 }  // namespace cutproof::gpu

@@ -104,9 +104,9 @@ struct alignas(128) Pace {
   float dt_fraction;            // dt / (dt + τ): the part of that time after which a particle is at x
   float decay, decay_per_dt;    // decay: e^(-c dt)
   float held_alpha, held_beta;  // coefficients of the push on held particles (step/iteration_numbers.cuh)
-  float s;                      // pull towards the goal (docs/design/method.md §3)
+  float s, volume_share;        // pull towards the goal; β (docs/design/method.md §3)
   Float3 fall;                  // dt (dt + τ) · gravity
-  Solver solver;
+  Solver solver;                // of two bytes, so that nothing in here is padding
   Acceleration acceleration;
   int nodes[2];
   Divider by_row, by_layer;

@@ -160,14 +160,17 @@ void describe(auto& v, MaterialSpec& s) {
 void describe(auto& v, ClusterSpec& s) {
   v.field(s.method, {"method",
                      "`boxes`: cores tile the grid and grow by one node, so that every edge is covered. `sampled`: "
-                     "greedy balls around seeds in random order (method.md §2)."});
-  v.field(s.side, {"side", "`boxes`: nodes per side of a core.", between(1, 1000, "nodes")});
+                     "greedy balls around seeds in random order. `tiles`: boxes that share their faces, for a "
+                     "`material` (method.md §2)."});
+  v.field(s.side, {"side", "`boxes`: nodes per side of a core. `tiles`: edges per side.", between(1, 1000, "nodes")});
   v.field(s.spacing,
           {"spacing", "`sampled`: distance within which a seed covers particles; covered ones become no seeds.",
            above(0, 1e4, "h")});
   v.field(s.radius, {"radius", "`sampled`: radius of the balls.", above(0, 1e4, "h")});
-  v.field(s.small, {"small", "A cluster is small, and may merge, below this multiple of the median size at cooking.",
-                    between(0, 1000)});
+  v.field(s.small,
+          {"small",
+           "A cluster is small, and may merge, below this multiple of the median size at cooking, of `tiles` side³.",
+           between(0, 1000)});
   v.field(s.cap, {"cap", "Merging makes no cluster larger than this multiple of the greatest size at cooking.",
                   between(1, 1000)});
 }

@@ -199,8 +199,8 @@ ContactStage::Places ContactStage::places(const std::vector<Vec3>& turned, const
   return result;
 }
 
-ContactStage::Rest ContactStage::rest(const std::vector<Mat3>& rotation, std::vector<Vec3>& center) {
-  const std::vector<Vec3> turned = turned_offsets(problem_, rotation);
+ContactStage::Rest ContactStage::rest(const Poses& poses, std::vector<Vec3>& center) {
+  const std::vector<Vec3> turned = turned_offsets(problem_, poses);
   Rest rest;
   Places now = places(turned, center);
   for (int step = 0; step < kMostSteps && !rest.found; ++step) {

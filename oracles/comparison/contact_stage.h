@@ -24,7 +24,7 @@ class ContactStage {
     bool found = false;         // t moves by rounding alone
   };
   // From where centers [m] are at `center`, which then are where they came to rest.
-  Rest rest(const std::vector<Mat3>& rotation, std::vector<Vec3>& center);
+  Rest rest(const Poses& poses, std::vector<Vec3>& center);
 
   // Whether particles are at a strict minimum of E over x and t. With friction there is no minimum; where blade and
   // walls act in turn, this is not known.

@@ -64,9 +64,9 @@ class LinearStage {
     for (int axis = 0; axis < 3; ++axis) refactor(axis, given());
   }
 
-  // Positions that minimise E over x and t with these maps of clusters, walls held.
-  std::vector<Vec3> positions(const std::vector<Mat3>& map) {
-    const std::vector<Vec3> turned = turned_offsets(problem_, map);
+  // Positions that minimise E over x and t with these offsets from t, walls held.
+  std::vector<Vec3> positions(const Poses& poses) {
+    const std::vector<Vec3> turned = turned_offsets(problem_, poses);
     std::vector<Vec3> x = problem_.predicted;
     for (int axis = 0; axis < 3; ++axis) minimise(axis, turned, x);
     return x;
@@ -197,9 +197,8 @@ ReferenceSolution solution_of(const SubstepProblem& problem, const std::vector<M
   std::vector<Vec3> first = first_positions(problem);
   if (!problem.contacts.path_matters()) {
     LinearStage linear(problem);
-    ReferenceSolution result = alternated(problem, std::move(first), previous, [&](const Poses& poses) {
-      return std::optional(linear.positions(poses.map));
-    });
+    ReferenceSolution result = alternated(problem, std::move(first), previous,
+                                          [&](const Poses& poses) { return std::optional(linear.positions(poses)); });
     result.is_minimum = result.converged;
     return result;
   }
@@ -214,7 +213,7 @@ ReferenceSolution solution_of(const SubstepProblem& problem, const std::vector<M
   std::vector<Vec3> center;
   ReferenceSolution result = alternated(problem, std::move(first), rotation, [&](const Poses& poses) {
     if (center.empty()) center = poses.center;
-    rest = contacts.rest(poses.map, center);
+    rest = contacts.rest(poses, center);
     return rest.found ? std::optional(rest.x) : std::nullopt;
   });
   result.is_minimum = result.converged && !rest.x.empty() && contacts.is_strict_minimum(rest);
@@ -305,7 +304,8 @@ std::vector<Vec3> substep_gradient(const Setup& setup, const State& state, const
   for (int32_t c = 0; c < problem.clusters.count(); ++c) {
     auto offset = problem.offset.begin() + problem.clusters.offsets[at(c)];
     for (const int32_t i : problem.clusters.of(c)) {
-      const Vec3 d = y[at(i)] - poses.center[at(c)] - poses.map[at(c)] * *offset++;
+      const Vec3 from_center = y[at(i)] - poses.center[at(c)];
+      const Vec3 d = (1 - problem.volume_share) * from_center - poses.map[at(c)] * *offset++;
       gradient[at(i)] += problem.stiffness * problem.rest.weight[at(i)] * d;
     }
   }

@@ -159,6 +159,7 @@ Poses poses_at(const SubstepProblem& problem, const std::vector<Vec3>& x, const 
   const Clusters& clusters = problem.clusters;
   const std::vector<Vec3> y = problem.ahead(x);
   Poses poses;
+  poses.y = y;
   for (int32_t c = 0; c < clusters.count(); ++c) {
     const Vec3 center = cluster_means(problem.rest, clusters, y, c).current;
     Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
@@ -169,23 +170,25 @@ Poses poses_at(const SubstepProblem& problem, const std::vector<Vec3>& x, const 
     poses.center.push_back(center);
     const Mat3 r = best_rotation(a, previous[at(c)]);
     poses.rotation.push_back(r);
-    poses.volume.push_back(r);
+    poses.from_f.emplace_back().m.fill(0);
     poses.map.push_back(r);
     if (problem.volume_share == 0) continue;
     const VolumeTarget volume =
         volume_target(to_mat3(a), problem.moments[at(c)], r, degenerate_rounds(kUnitRoundoff) * kUnitRoundoff);
-    poses.volume.back() = volume.v;
-    poses.map.back() = volume.map(problem.volume_share, r);
+    poses.from_f.back() = volume.from_f;
+    poses.map.back() = volume.goal_map(problem.volume_share, r);
   }
   return poses;
 }
 
-std::vector<Vec3> turned_offsets(const SubstepProblem& problem, const std::vector<Mat3>& map) {
+std::vector<Vec3> turned_offsets(const SubstepProblem& problem, const Poses& poses) {
   std::vector<Vec3> mean(at(problem.body.particle_count()));
   const Clusters& clusters = problem.clusters;
   for (int32_t c = 0; c < clusters.count(); ++c) {
     auto offset = problem.offset.begin() + clusters.offsets[at(c)];
-    for (const int32_t i : clusters.of(c)) mean[at(i)] += map[at(c)] * *offset++;
+    for (const int32_t i : clusters.of(c)) {
+      mean[at(i)] += poses.map[at(c)] * *offset++ + problem.volume_share * (poses.y[at(i)] - poses.center[at(c)]);
+    }
   }
   for (int32_t i = 0; i < problem.body.particle_count(); ++i) {
     const auto count = problem.memberships.of(i).size();
@@ -197,7 +200,7 @@ std::vector<Vec3> turned_offsets(const SubstepProblem& problem, const std::vecto
 namespace {
 // [n] g_i; of a particle in no cluster, where it wants to be anyway.
 std::vector<Vec3> goals_of(const SubstepProblem& problem, const Poses& poses) {
-  std::vector<Vec3> goal = turned_offsets(problem, poses.map);
+  std::vector<Vec3> goal = turned_offsets(problem, poses);
   for (int32_t i = 0; i < problem.body.particle_count(); ++i) {
     const auto clusters = problem.memberships.of(i);
     if (clusters.empty()) {
@@ -235,7 +238,7 @@ double energy_at(const SubstepProblem& problem, const std::vector<Vec3>& x, cons
     auto offset = problem.offset.begin() + problem.clusters.offsets[at(c)];
     for (const int32_t i : problem.clusters.of(c)) {
       const Vec3 from_center = y[at(i)] - poses.center[at(c)], arm = *offset++;
-      const Vec3 d = from_center - poses.rotation[at(c)] * arm, e = from_center - poses.volume[at(c)] * arm;
+      const Vec3 d = from_center - poses.rotation[at(c)] * arm, e = poses.from_f[at(c)] * arm;
       elastic +=
           problem.rest.weight[at(i)] * ((1 - problem.volume_share) * dot(d, d) + problem.volume_share * dot(e, e));
     }

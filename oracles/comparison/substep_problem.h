@@ -55,21 +55,23 @@ struct SubstepProblem {
 std::vector<Vec3> first_positions(const SubstepProblem& problem);
 
 struct Poses {
+  std::vector<Vec3> y;         // [n] where elasticity acts
   std::vector<Vec3> center;    // t_c
   std::vector<Mat3> rotation;  // R_c
-  std::vector<Mat3> volume;    // V_c; without a share of it, R_c
-  std::vector<Mat3> map;       // B_c
+  std::vector<Mat3> from_f;    // V_c - F_c; without a share of it, 0
+  std::vector<Mat3> map;       // C_c
 };
 // The best where elasticity acts when particles are at x. Where many rotations are, the one nearest to `previous`.
 Poses poses_at(const SubstepProblem& problem, const std::vector<Vec3>& x, const std::vector<Mat3>& previous);
 
-// [n] the mean over a particle's clusters of B_c (X_i − T_c), to which the mean of t_c is added to give g_i.
-std::vector<Vec3> turned_offsets(const SubstepProblem& problem, const std::vector<Mat3>& map);
+// [n] g_i less the mean of t_c over a particle's clusters: the mean of C_c (X_i − T_c) + β (y_i − t_c). A minimum of E
+// with this held fixed lowers E: what is left out bounds it from above.
+std::vector<Vec3> turned_offsets(const SubstepProblem& problem, const Poses& poses);
 
 // One plain iteration from x, whose poses are given.
 std::vector<Vec3> plain_iterate(const SubstepProblem& problem, const std::vector<Vec3>& x, const Poses& poses);
 
-// E at positions x with these t, R and V [kg m²/s²]. Held particles have no inertia: their positions are given.
+// E at positions x with these t, R and V − F [kg m²/s²]. Held particles have no inertia: their positions are given.
 double energy_at(const SubstepProblem& problem, const std::vector<Vec3>& x, const Poses& poses);
 
 }  // namespace cutproof::oracles

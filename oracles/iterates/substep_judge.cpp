@@ -240,16 +240,18 @@ void SubstepJudge::iteration(int32_t k, const State* earlier, const State& now, 
         of_member = off * volume.lever(arm[m]);
         goal_squares[at(members[m])] += square(of_member);
       }
-      map = volume.map(share, map);
+      map = volume.goal_map(share, map);
     }
+    const double of_centers = 1 - setup_.step.volume_share;
     const bool is_single = began_.precision == Precision::binary32;
     const Vec3 center = base + mean;
-    const double squares = square(2 * u_ * norm(is_single ? center - cluster.rest : center)) +
-                           3 * square(rounds) * spread + square(places) + square(2 * u_ * cluster.radius) +
+    const double of_mean = square(2 * u_ * norm(is_single ? center - cluster.rest : center)) +
+                           3 * square(rounds) * spread + square(places);
+    const double squares = square(of_centers) * of_mean + square(2 * u_ * cluster.radius) +
                            (is_single ? 0 : square(u_ * norm(cluster.rest)));
     cluster.center_off = std::sqrt(squares);
     for (std::size_t m = 0; m < members.size(); ++m) {
-      sum[at(members[m])] += center + map * arm[m];
+      sum[at(members[m])] += of_centers * center + map * arm[m];
       goal_squares[at(members[m])] += squares;
     }
   }
@@ -262,11 +264,12 @@ void SubstepJudge::iteration(int32_t k, const State* earlier, const State& now, 
   for (int32_t i = 0; i < setup_.body.particle_count(); ++i) {
     if (began_.alive[at(i)] == 0) continue;
     const double holders = holders_[at(i)];
-    const Vec3 is = y[at(i)], goal = holders > 0 ? sum[at(i)] / holders : is;
+    const double own = setup_.step.volume_share;
+    const Vec3 is = y[at(i)], goal = holders > 0 ? own * is + sum[at(i)] / holders : is;
     const Vec3 from = implicit_ ? ahead(i, predicted_[at(i)]) : is;
     const Vec3 plain = from + s_ * (goal - from);
-    const double of_goal = (holders > 0 ? goal_squares[at(i)] / square(holders) : 0) +
-                           square(u_ * (6 * norm(goal - from) + 2 * lever_[at(i)]));
+    const double of_goal = (holders > 0 ? goal_squares[at(i)] / square(holders) : 0) + square(own * place[at(i)]) +
+                           square(u_ * (6 * norm(goal - from) + own * norm(is - from) + 2 * lever_[at(i)]));
     const double of_from = implicit_ ? begin_squares_[at(i)] / square(share_) : square(place[at(i)]);
     double squares = square(pull) * (square(s_) * of_goal + square(1 - s_) * of_from);
     Vec3 free = plain;

@@ -514,7 +514,7 @@ void StepModel::Run::match_shapes(int32_t s, int32_t j) {
       const double sums = sum_rounds(terms) * u_, off = sums * size.norm() + kRotationRounds * u_ * a.norm();
       volume_rounding = share * volume.rounding(off, sums, u_);
       if (volume.is_open(off, sums, u_)) note_open(c);
-      map = volume.map(share, r);
+      map = volume.goal_map(share, r);
       if (disturbed_) {
         Mat3 noise;
         for (double& entry : noise.m) entry = share * kRotationRounds * u_ * volume.size * noise_();
@@ -526,8 +526,10 @@ void StepModel::Run::match_shapes(int32_t s, int32_t j) {
         }
       }
     }
-    if (disturbed_) t -= map * rest_off_[at(c)];
-    const double center_rounding = 4 * u_ * u_ * dot(center, center) + 3 * mean_amplitude * mean_amplitude;
+    const double of_centers = 1 - setup_.step.volume_share;
+    if (disturbed_) t -= map * rest_off_[at(c)] / of_centers;
+    const double center_rounding =
+        of_centers * of_centers * (4 * u_ * u_ * dot(center, center) + 3 * mean_amplitude * mean_amplitude);
     if (!disturbed_) {
       // A common error of all members moves their sum as a whole; a rest center is off in each iteration.
       const double rest_amplitude = u_ * ((stores_positions_ ? norm(cluster.rest) : 0) + cluster.radius);
@@ -535,7 +537,7 @@ void StepModel::Run::match_shapes(int32_t s, int32_t j) {
           cluster.mass * cluster.mass * (center_rounding + setup_.step.iterations * rest_amplitude * rest_amplitude);
     }
     for (std::size_t k = 0; k < members.size(); ++k) {
-      sum_[at(members[k])] += t + map * arm[k];
+      sum_[at(members[k])] += of_centers * t + map * arm[k];
       if (!disturbed_) {
         const double of_volume = volume_rounding > 0 ? volume_rounding * volume.lever(arm[k]) : 0;
         goal_rounding_[at(members[k])] +=
@@ -630,11 +632,12 @@ void StepModel::Run::substep(int32_t s) {
     for (std::size_t i = 0; i < start.size(); ++i) {
       if (before_.alive[i] == 0) continue;
       const double holders = model_.holders_[i];
-      const Vec3 goal = holders > 0 ? sum_[i] / holders : now[i];
+      const Vec3 goal = holders > 0 ? step.volume_share * now[i] + sum_[i] / holders : now[i];
       const Vec3 from = implicit ? predicted_ahead[i] : now[i];
       const Vec3 plain_ahead = from + pull * (goal - from), plain = back(i, plain_ahead);
       Vec3 free = plain;
-      double amplitude = share_ * u_ * pull * (2 * norm(goal - from) + model_.lever_[i]);
+      double amplitude =
+          share_ * u_ * pull * (2 * norm(goal - from) + step.volume_share * norm(now[i] - from) + model_.lever_[i]);
       if (combined) {
         const Vec3 drawn = weights[at(j)].pull * (plain_ahead - now[i]);
         const Vec3 swung = weights[at(j)].carry * (now[i] - earlier[i]);

@@ -20,50 +20,49 @@ struct Bar {
   MaterialBar* operator->() { return &bar; }
 };
 
-// Cubes that tile hang as the formula of the method says, but where the bar is held.
+// A bar hangs as the formula of the method says, but where it is held.
 TEST(MaterialBars, HaveTheModuliOfTheirMaterial) {
-  for (const double nu : {0.0, 0.3, 0.45}) {
-    Bar bar({.side = 2, .poisson_ratio = nu, .across = 6});
+  for (const double nu : {0.0, 0.45}) {
+    Bar bar({.poisson_ratio = nu, .across = 7});
     const std::vector<MaterialFigure> hung = bar->hang();
-    EXPECT_NEAR(hung.at(0).measured / hung.at(0).asked, 1, nu == 0 ? 1e-3 : 0.12) << nu;
+    EXPECT_NEAR(hung.at(0).measured / hung.at(0).asked, 1, nu == 0 ? 1e-3 : 0.03) << nu;
     EXPECT_NEAR(hung.at(1).measured, nu, 0.02);
     const MaterialFigure volume = bar->pull();
     EXPECT_NEAR(volume.measured, volume.asked, 0.01) << nu;
-    EXPECT_NEAR(volume.asked, nu == 0 ? 1.2 : nu == 0.3 ? 1.075 : 1.02, 0.01);
+    EXPECT_NEAR(volume.asked, nu == 0 ? 1.2 : 1.02, 0.01);
   }
 }
 
 TEST(MaterialBars, SwingAndDecayAsTheyShould) {
-  // Irregular covers are stiffer.
-  for (const std::string along : {"100", "110", "111"}) {
-    Bar bar({.along = along, .side = 2, .across = 8});
+  for (const std::string along : {"100", "111"}) {
+    Bar bar({.along = along, .across = 7});
     for (const MaterialFigure& one : {bar->swing_along(), bar->swing_across()}) {
       EXPECT_GT(one.measured / one.asked, 0.95) << along << " " << one.test;
-      EXPECT_LT(one.measured / one.asked, along == "100" ? 1.05 : 1.5) << along << " " << one.test;
+      EXPECT_LT(one.measured / one.asked, along == "100" ? 1.05 : 1.3) << along << " " << one.test;
     }
     const MaterialFigure decay = bar->decay();
     EXPECT_NEAR(decay.measured / decay.asked, 1, 0.02) << along;
   }
 }
 
-// A twist is not affine within a cluster, so k resists it: the more, the fewer clusters lie across. Turn this round
-// when clusters follow it.
-TEST(KnownGap, BarsTwistTooStifflyWhereFewClustersLieAcross) {
+// A twist is not affine within a cluster, so an error of second order is left: the same for all ν, because β does not
+// resist it.
+TEST(MaterialBars, TwistAsStifflyWhateverTheirPoissonRatio) {
   const auto excess = [](int32_t across, double nu) {
-    Bar bar({.side = 2, .poisson_ratio = nu, .across = across});
+    Bar bar({.poisson_ratio = nu, .across = across});
     const MaterialFigure twist = bar->twist();
     return twist.measured / twist.asked - 1;
   };
-  const double coarse = excess(6, 0), fine = excess(12, 0);
-  EXPECT_GT(fine, 0.05);
-  EXPECT_NEAR(std::log2(coarse / fine), 2, 0.5);
-  EXPECT_GT(excess(6, 0.45), 5 * coarse);
+  const double coarse = excess(5, 0.45), fine = excess(9, 0.45);
+  EXPECT_LT(fine, 0.2);
+  EXPECT_NEAR(std::log2(coarse / fine), 2, 0.6);
+  EXPECT_NEAR(excess(9, 0), fine, 0.03);
 }
 
 TEST(MaterialBars, AreSofterAfterFewIterations) {
   double last = 0;
   for (const int32_t iterations : {1, 2, 4}) {
-    Bar bar({.side = 2, .across = 6, .iterations = iterations});
+    Bar bar({.across = 7, .iterations = iterations});
     const MaterialFigure one = bar->swing_along();
     EXPECT_NEAR(one.measured / one.asked, 1, 0.05) << iterations;
     EXPECT_GT(one.asked, last);

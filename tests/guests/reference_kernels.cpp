@@ -295,11 +295,11 @@ void sum_rest_frames(const Body& body, const std::string& how, Clusters& cluster
   }
 }
 
-// The map by which a cluster carries points, from sums of coordinates of its own.
-Mat3 map_of(const Setup& setup, const Clusters& clusters, int32_t c, const std::vector<Real>& weight,
-            const std::vector<Vec3>& x, const Sum& center) {
+// The maps by which a cluster carries points, from sums of coordinates of its own.
+reference::ClusterMaps maps_of(const Setup& setup, const Clusters& clusters, int32_t c, const std::vector<Real>& weight,
+                               const std::vector<Vec3>& x, const Sum& center) {
   const Mat3& rotation = clusters.rotation[at(c)];
-  if (setup.step.volume_share == 0 || clusters.size(c) == 1) return rotation;
+  if (setup.step.volume_share == 0 || clusters.size(c) == 1) return {rotation, rotation};
   const Sum at_rest = real(clusters.rest_center[at(c)]);
   std::array<Real, 9> a = {}, a0 = {};
   for (const int32_t i : clusters.of(c)) {
@@ -315,7 +315,7 @@ Mat3 map_of(const Setup& setup, const Clusters& clusters, int32_t c, const std::
   Mat3 moment, moment_at_rest;
   std::copy(a.begin(), a.end(), moment.m.begin());
   std::copy(a0.begin(), a0.end(), moment_at_rest.m.begin());
-  return reference::goal_map(setup.step.volume_share, moment, moment_at_rest, rotation);
+  return reference::cluster_maps(setup.step.volume_share, moment, moment_at_rest, rotation);
 }
 
 void sum_skin(const Setup& setup, const std::string& how, State& state) {
@@ -323,29 +323,32 @@ void sum_skin(const Setup& setup, const std::string& how, State& state) {
   const Clusters& clusters = state.clusters;
   const std::vector<Real> weight = weights_of(body, clusters, false);
   std::vector<Sum> center;
-  std::vector<Mat3> map;
+  std::vector<reference::ClusterMaps> maps;
   std::vector<std::vector<int32_t>> holders(body.mass.size());
   for (int32_t c = 0; c < clusters.count(); ++c) {
     center.push_back(
         mean_of(
             clusters.of(c), weight, [&](int32_t i) { return real(state.x[at(i)]); }, how == "from the first")
             .first);
-    map.push_back(map_of(setup, clusters, c, weight, state.x, center.back()));
+    maps.push_back(maps_of(setup, clusters, c, weight, state.x, center.back()));
     for (const int32_t i : clusters.of(c)) holders[at(i)].push_back(c);
   }
   for (std::size_t v = 0; v < state.skin.owner.size(); ++v) {
     const int32_t owner = state.skin.owner[v];
-    Sum rest = real(body.rest_position(owner)), sum = {};
+    const Sum rest = real(body.rest_position(owner)), place = real(state.x[at(owner)]);
+    Sum beside = {}, sum = {};
+    const auto own = static_cast<Real>(setup.step.volume_share);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      rest[axis] += static_cast<Real>(state.skin.reach[v]) * static_cast<Real>(body.grid.spacing) *
-                    static_cast<Real>(kDirections[state.skin.direction[v]][axis]);
+      beside[axis] = static_cast<Real>(state.skin.reach[v]) * static_cast<Real>(body.grid.spacing) *
+                     static_cast<Real>(kDirections[state.skin.direction[v]][axis]);
     }
     for (const int32_t c : holders[at(owner)]) {
       const Sum at_rest = real(clusters.rest_center[at(c)]);
       for (std::size_t row = 0; row < 3; ++row) {
-        Real there = center[at(c)][row];
+        Real there = own * place[row] + (1 - own) * center[at(c)][row];
         for (std::size_t k = 0; k < 3; ++k) {
-          there += static_cast<Real>(map[at(c)].m[3 * row + k]) * (rest[k] - at_rest[k]);
+          there += static_cast<Real>(maps[at(c)].goal.m[3 * row + k]) * (rest[k] - at_rest[k]) +
+                   static_cast<Real>(maps[at(c)].carry.m[3 * row + k]) * beside[k];
         }
         sum[row] += there;
       }

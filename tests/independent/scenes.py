@@ -97,9 +97,14 @@ SCENES = {
         "body": block(8, 5, 1), "clusters": {"side": 3}, "frame": {"count": 8}, "step": {**DOWN, "volume_share": 0.8},
         "detect": {"criterion": "none"}, "grips": [{"low": [0, 0, 0], "high": [0.1, 1, 1]}]},
     "volume_stretched": {
-        "body": block(8, 4, 4), "clusters": {"side": 2}, "frame": {"count": 10}, "step": {"volume_share": 0.94, "stiffness": 1e6, "iterations": 8},
+        "body": block(8, 4, 4), "clusters": {"method": "tiles", "side": 2}, "frame": {"count": 10}, "step": {"volume_share": 0.94, "stiffness": 1e6, "iterations": 8},
         "detect": {"criterion": "none"}, "grips": [{"low": [0, 0, 0], "high": [0.1, 1, 1], "velocity": [-0.2, 0, 0]},
                                                    {"low": [0.9, 0, 0], "high": [1, 1, 1], "velocity": [0.2, 0, 0.1]}]},
+    # a rounded body, cut
+    "tiles": {
+        "body": {"shape": {"kind": "kidney", "size": [0.1, 0.06, 0.05]}, "spacing": 0.008}, "frame": {"count": 14},
+        "clusters": {"method": "tiles", "side": 2}, "step": {**DOWN, "volume_share": 0.93, "stiffness": 2e5},
+        "ground": {}, "blade": {"speed": 0.8, "strokes": PRESS}},
     "grips_alone": {
         "body": block(8, 4, 3), "clusters": {"side": 2, "cap": 1.2, "small": 0.9}, "frame": {"settle": 0.05},
         "step": {"acceleration": "none", "substeps": 3, "iterations": 5}, "merge": {"rule": "published"}, "expand": {"rule": "published"},
@@ -240,5 +245,5 @@ SCENES = {
 for scene in SCENES.values():
     scene["version"] = 5
 
-SHORT = ("wedge", "long_prism", "friction", "frictionless", "mixed_walls", "retardation", "volume", "volume_of_sheets", "grips_alone", "grips_after_strokes", "sampled", "sampled_deep",
+SHORT = ("wedge", "long_prism", "friction", "frictionless", "mixed_walls", "retardation", "volume", "volume_of_sheets", "tiles", "grips_alone", "grips_after_strokes", "sampled", "sampled_deep",
          "sampled_published", "arc_fast", "arc_geometric", "corners", "strain", "tilted", "debris", "shapes", "alpha", "slanted_skin", "fork", "on_surfaces", "isolated", "diagonal", "begun_inside", "fallen", "rods")

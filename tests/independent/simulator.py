@@ -275,6 +275,25 @@ def boxes(body, side):
     return [Cluster(c, part) for c, part in enumerate(found)]
 
 
+def tiles(body, side):
+    """M2.8."""
+    place, found = body.place - body.place.min(axis=0), []
+    last = place.max(axis=0) // side
+    for cube in sorted(itertools.product(*(range(n + 1) for n in last)), key=lambda cube: cube[::-1]):
+        low = np.array(cube) * side
+        inside = np.nonzero(((low <= place) & (place <= low + side)).all(axis=1))[0]
+        found += sorted(components(body, inside), key=min)
+    found = [set(part) for part in found]
+    layer = lambda part: (np.ptp(place[sorted(part)], axis=0) == 0).any()
+    pairs = lambda part: {(i, j) for i in part for j in body.around[i] if j in part} | {(i, i) for i in part}
+    held = collections.Counter(pair for part in found for pair in pairs(part))
+    for part in sorted((part for part in found if layer(part)), key=len):
+        if all(held[pair] > 1 for pair in pairs(part)):
+            held.subtract(pairs(part))
+            found.remove(part)
+    return [Cluster(c, sorted(part)) for c, part in enumerate(found)]
+
+
 def sampled(body, spacing, radius, seed):
     """M2.4."""
     covered, found = set(), []
@@ -292,10 +311,13 @@ def cook(scene, body):
     options = scene["clusters"]
     if options["method"] == "boxes":
         clusters = boxes(body, options["side"])
+    elif options["method"] == "tiles":
+        clusters = tiles(body, options["side"])
     else:
         clusters = sampled(body, options["spacing"], options["radius"], scene["seed"])
     sizes = sorted(len(c.members) for c in clusters)
-    tau = ceil_product(options["small"] * sizes[(len(sizes) - 1) // 2])
+    usual = options["side"]**3 if options["method"] == "tiles" else sizes[(len(sizes) - 1) // 2]
+    tau = ceil_product(options["small"] * usual)
     cap = floor_product(options["cap"] * sizes[-1])
     clusters = merge(body, clusters, scene["merge"]["rule"], tau, cap)
     expanded = options["method"] == "sampled" and scene["expand"]["rule"] == "edge_cover"
@@ -304,7 +326,7 @@ def cook(scene, body):
         clusters = merge(body, clusters, scene["merge"]["rule"], tau, cap)
     for number, cluster in enumerate(clusters):
         cluster.number = number
-    return clusters, tau, cap, expanded or options["method"] == "boxes"
+    return clusters, tau, cap, expanded or options["method"] != "sampled"
 
 
 # -------------------------------------------------------------------------------------------------------- 9. Schedule
@@ -643,9 +665,9 @@ def nearest_product(sigma, product):
 
 
 def volume(A, A0, R):
-    """M3.16, M3.17."""
+    """M3.16, M3.17: V, and V - F."""
     if not np.isfinite(A).all():
-        return R
+        return R, 0 * R
     extents, axes = np.linalg.eigh(A0)
     if np.linalg.det(A0) > (np.trace(A0) / 15) ** 3:
         inverse_root = axes / np.sqrt(extents) @ axes.T
@@ -654,10 +676,11 @@ def volume(A, A0, R):
             if np.linalg.det(turn) < 0:
                 turn[2] *= -1
                 sigma[2] *= -1
-        return U * nearest_product(sigma, np.sqrt(extents.prod())) @ Zt @ inverse_root
+        V = U * nearest_product(sigma, np.sqrt(extents.prod())) @ Zt @ inverse_root
+        return V, V - A @ np.linalg.inv(A0)
     along = axes[:, extents > 1e-3 * extents.max()]
     inverse = along / extents[extents > 1e-3 * extents.max()] @ along.T
-    return A @ inverse + R @ (np.eye(3) - along @ along.T)
+    return A @ inverse + R @ (np.eye(3) - along @ along.T), 0 * R
 
 
 # ------------------------------------------------------------------------------------------------ the stages
@@ -691,23 +714,27 @@ class Cover:
         return np.add.reduceat((self.w[:, None] * (y[self.i] - t[self.c]))[:, :, None] * self.r[:, None, :], self.starts)
 
     def maps(self, beta, y, t):
-        """M3.15: B."""
+        """M3.15: β, C and B."""
         if beta == 0:
-            return self.R
-        V = np.array([volume(A, A0, R) for A, A0, R in zip(self.moments(y, t), self.A0, self.R)])
-        return (1 - beta) * self.R + beta * V
+            return beta, self.R, self.R
+        V, pull = np.array([volume(A, A0, R) for A, A0, R in zip(self.moments(y, t), self.A0, self.R)]).swapaxes(0, 1)
+        return beta, (1 - beta) * self.R + beta * pull, (1 - beta) * self.R + beta * V
 
-    def exact_mean(self, y, t, B):
+    def exact_mean(self, y, t, maps):
         """M3.5, last sentence."""
+        beta, C, _ = maps
         error = np.add.reduceat(self.w[:, None] * (y[self.i] - t[self.c]), self.starts)
-        return t + (error - np.einsum("cij,cj->ci", B, self.offset)) / self.M[:, None]
+        return t + (error - np.einsum("cij,cj->ci", C, self.offset) / (1 - beta)) / self.M[:, None]
 
-    def carried(self, t, B, otherwise, shift=None):
-        """The mean place where its clusters carry each particle, shifted by `shift` at rest."""
-        r = self.r if shift is None else self.r + shift[self.i]
-        place = t[self.c] + np.einsum("pij,pj->pi", B[self.c], r)
+    def carried(self, t, maps, y, shift=None):
+        """M3.2, M8.1: the mean place where its clusters carry each particle, or a point that rests `shift` beside it."""
+        beta, C, B = maps
+        place = (1 - beta) * t[self.c] + np.einsum("pij,pj->pi", C[self.c], self.r)
+        if shift is not None:
+            place += np.einsum("pij,pj->pi", B[self.c], shift[self.i])
         total = np.stack([np.bincount(self.i, place[:, k], len(self.n)) for k in range(3)], axis=1)
-        return np.where((self.n > 0)[:, None], total / np.maximum(self.n, 1)[:, None], otherwise)
+        alone = y if shift is None else y + shift
+        return np.where((self.n > 0)[:, None], beta * y + total / np.maximum(self.n, 1)[:, None], alone)
 
 
 def merge(body, clusters, rule, tau, cap):
@@ -886,8 +913,8 @@ class Simulator:
         for j in range(o["iterations"]):
             t = cover.mean(y)
             cover.R, self.flags, self.gap = rotations(cover.moments(y, t), cover.R)
-            B = cover.maps(o["volume_share"], y, t)
-            g = cover.carried(cover.exact_mean(y, t, B), B, y)
+            maps = cover.maps(o["volume_share"], y, t)
+            g = cover.carried(cover.exact_mean(y, t, maps), maps, y)
             p = y + s * (g - y) if published else guess_ahead + s * (g - guess_ahead)
             combined = lambda new, now, last: new
             if o["acceleration"] == "chebyshev" and j > 0:
@@ -1005,18 +1032,18 @@ class Simulator:
     # ------------------------------------------------------------------------------------------------------- skin
 
     def places(self):
-        """t_c and B_c of M4.2."""
+        """t_c, and the maps of M4.2."""
         t = self.cover.mean(self.x)
         return t, self.cover.maps(self.scene["step"]["volume_share"], self.x, t)
 
     def skin_positions(self, owner, direction, reach):
         """M8.1."""
-        (t, B), place = self.places(), np.empty((len(owner), 3))
+        (t, maps), place = self.places(), np.empty((len(owner), 3))
         for d in range(6):
             shift = np.zeros((self.body.count, 3))
             which = direction == d
             shift[owner[which]] = (reach[which] * self.body.h)[:, None] * DIRECTIONS[d]
-            place[which] = self.cover.carried(t, B, self.x + shift, shift)[owner[which]]
+            place[which] = self.cover.carried(t, maps, self.x, shift)[owner[which]]
         return place
 
     def make_skin(self):

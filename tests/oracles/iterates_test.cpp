@@ -160,7 +160,7 @@ const Wrong kLeast[] = {
            [](State& s, double off) {
              for (double& entry : s.clusters.rotation[3].m) entry *= 1 + off;
            })},
-    {"impulse", 1e-12, state(1, [](State& s, double off) { s.impulse = (1 + off) * s.impulse; })},
+    {"impulse", 2e-12, state(1, [](State& s, double off) { s.impulse = (1 + off) * s.impulse; })},
     {"flag", 1, state(2, [](State& s, double) { s.clusters.degenerate[3] = 1; })},
 };
 

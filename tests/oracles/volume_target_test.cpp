@@ -39,11 +39,11 @@ TEST(VolumeTarget, OfTheReferenceLiesWithinItsRounding) {
       ++open;
       continue;
     }
-    const Mat3 v = reference::closest_volume(to_mat3(a), to_mat3(a0), to_mat3(r));
+    const Mat3 v = reference::cluster_maps(1, to_mat3(a), to_mat3(a0), to_mat3(r)).carry;
     ASSERT_LE(apart(target, v, a0), target.rounding(4 * u * a.norm(), 4 * u, u)) << f;
     // An error of A shows as such, and its effect is bounded.
     const Matrix off = 1e-9 * draw.matrix();
-    const Mat3 other = reference::closest_volume(to_mat3(Matrix(a + off)), to_mat3(a0), to_mat3(r));
+    const Mat3 other = reference::cluster_maps(1, to_mat3(Matrix(a + off)), to_mat3(a0), to_mat3(r)).carry;
     if (target.is_open(off.norm(), 4 * u, u)) continue;
     ASSERT_LE(apart(target, other, a0), 1.01 * target.rounding(off.norm(), 4 * u, u)) << f;
   }
@@ -63,7 +63,7 @@ TEST(VolumeTarget, TellsApartWhatIsNearlyIt) {
     EXPECT_LT(bound, 1e-11);
     const Matrix mueller = f / std::cbrt(f.determinant());
     EXPECT_GT(apart(target, to_mat3(mueller), a0), 1e3 * bound);
-    const Mat3 even = reference::closest_volume(to_mat3(f), Mat3{}, to_mat3(r));
+    const Mat3 even = reference::cluster_maps(1, to_mat3(f), Mat3{}, to_mat3(r)).carry;
     EXPECT_GT(apart(target, even, a0), 1e3 * bound);
     EXPECT_GT(apart(target, to_mat3(r), a0), 1e3 * bound);
   }

@@ -12,7 +12,7 @@ namespace cutproof::volume_test {
 namespace {
 
 using Matrix = Eigen::Matrix3d;
-using reference::closest_volume;
+using reference::cluster_maps;
 
 Mat3 to_mat3(const Matrix& m) {
   Mat3 result;
@@ -30,7 +30,7 @@ Matrix to_eigen(const Mat3& m) {
 }
 
 Matrix nearest(const Matrix& f, const Matrix& a0, const Matrix& r = Matrix::Identity()) {
-  return to_eigen(closest_volume(to_mat3(f * a0), to_mat3(a0), to_mat3(r)));
+  return to_eigen(cluster_maps(1, to_mat3(f * a0), to_mat3(a0), to_mat3(r)).carry);
 }
 
 double distance(const Matrix& v, const Matrix& f, const Matrix& a0) {

@@ -15,7 +15,7 @@ work.mkdir(parents=True)
 # Extracts of several documents (ci/extract_results.py and others), so no command has written them: they have no page as they
 # stand.
 COLLECTIONS = {"cpu_isolation", "cpu_lockstep_host", "cpu_methods_host", "cpu_nightly",
-               "h200_baselines", "h200_fronts", "h200_geometry", "h200_guests", "h200_kit_summary", "h200_material", "h200_methods",
+               "h200_baselines", "h200_fronts", "h200_geometry", "h200_guests", "h200_kit_summary", "h200_methods",
                "h200_solver_every_frame", "mutation_testing"}
 LATEST = {"cutproof.fuzz": 4, "cutproof.bench": 3, "cutproof.judge": 1}
 

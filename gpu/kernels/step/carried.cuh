@@ -61,7 +61,7 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
   block.wait_for_earlier();  // for the clusters; all other data is older
   if (!active) return false;
   const float lost_next = now.lost_after;
-  Rows<Team<Block, kRows>> goals = mean_goal(team, w, head, ahead.holders, pace.h, base), plain, next;
+  Rows<Team<Block, kRows>> goals = mean_goal(team, w, head, ahead.holders, pace, base), plain, next;
   if constexpr (!kAllAhead) team.each(3, read_maps);
   team.each(3, [&](int axis) {
     const int64_t at = 3 * int64_t{g} + axis;
@@ -88,10 +88,7 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
         return;
       }
     }
-    const auto relaxed = [&](float wanted, float is) {
-      const float toward = now.s * wanted;
-      return now.implicit ? toward : (1.0f - now.s) * is + toward;
-    };
+    const auto relaxed = [&](float wanted, float is) { return now.own * is + now.s * wanted; };
     plain.of(axis) = row_of(relaxed, goal, present.of(axis));
     next.of(axis) = plain.of(axis);
     if constexpr (kAccelerated) {
@@ -119,7 +116,7 @@ CUTPROOF_DEVICE bool advance_carried(Block& block, const Team<Block, kRows>& tea
       CUTPROOF_ROLLED
       for (int k = 0; k < (now.combined ? 2 : 1); ++k) {
         Rows<Team<Block, kRows>> candidate = k == 0 ? plain : next;
-        const Ball ball = ball_around(pace, ahead.group, base, 1.0f - lost_next, candidate.all(team));
+        const Ball ball = ball_around(pace, ahead.group, base, fabsf(1.0f - lost_next), candidate.all(team));
         if (!is_clear(contacts, ball, side)) return true;
       }
     }

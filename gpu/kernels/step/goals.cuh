@@ -39,10 +39,12 @@ CUTPROOF_DEVICE inline GroupAhead<kAtOnce> group_ahead(const DeviceView& w, int 
 template <int kRows>
 inline constexpr int kHoldersAtOnce = kRows > 1 ? 8 : 4;
 
-// The mean goal of a group is base + goal(r). Returns `goal`, each row in the lane that has its axis.
+// The mean goal of a group's particle at x is base + β (x - base) + goal(r). Returns `goal`, each row in the lane that
+// has its axis.
 template <int kAtOnce, class AnyTeam>
 CUTPROOF_DEVICE inline Rows<AnyTeam> mean_goal(const AnyTeam& team, const DeviceView& w, const GroupHead& head,
-                                               SomeHolders<kAtOnce> some, float h, Float4 base) {
+                                               SomeHolders<kAtOnce> some, const Pace& pace, Float4 base) {
+  const float h = pace.h, of_centers = 1.0f - pace.volume_share;
   Rows<AnyTeam> goal;
   const auto add = [&](int begin) {
     // Several are read at once, along all axes: one by one, each would wait for the previous one.
@@ -60,7 +62,7 @@ CUTPROOF_DEVICE inline Rows<AnyTeam> mean_goal(const AnyTeam& team, const Device
         sum.x += of.x;
         sum.y += of.y;
         sum.z += of.z;
-        sum.w += (of.w - from) + h * (of.x * to.x + of.y * to.y + of.z * to.z);
+        sum.w += of_centers * (of.w - from) + h * (of.x * to.x + of.y * to.y + of.z * to.z);
       }
     });
   };

@@ -42,21 +42,10 @@ CUTPROOF_DEVICE inline Combination chebyshev(float kdt2, int order) {
   return {omega * (2.0f / (1.0f + r2)), omega - 1.0f};
 }
 
-// l: the part of a group's predicted shape that is lost after so many iterations.
-CUTPROOF_DEVICE inline float lost_fraction(const Pace& pace, int iterations) {
-  if (iterations == 0) return 0.0f;
-  if (pace.solver == Solver::implicit) return pace.s;
-  float kept = 1.0f, power = 1.0f - pace.s;
-  for (int n = iterations; n > 0; n /= 2) {
-    if (n % 2 != 0) kept *= power;
-    power *= power;
-  }
-  return 1.0f - kept;
-}
-
 // An iteration of a body.
 struct Iteration {
   float s;
+  float own;  // of where a particle is, the part that a plain iteration keeps: s β, and 1 - s unless implicit
   bool implicit;
   bool combined;  // the first iteration is plain
   bool keeps;     // stores data of the next iteration, unless this is the last
@@ -67,6 +56,7 @@ CUTPROOF_DEVICE inline Iteration iteration_of(const Pace& pace, int iteration, c
   Iteration now = {};
   now.s = pace.s;
   now.implicit = pace.solver == Solver::implicit;
+  now.own = pace.s * pace.volume_share + (now.implicit ? 0.0f : 1.0f - pace.s);
   const bool accelerated = pace.acceleration == Acceleration::chebyshev;
   now.combined = accelerated && iteration > 0;
   now.keeps = accelerated && iteration + 1 < pace.iterations;
@@ -75,11 +65,21 @@ CUTPROOF_DEVICE inline Iteration iteration_of(const Pace& pace, int iteration, c
   now.lost_after = numbers.lost_after;
   return now;
 }
-// Computed once a frame: a root and powers take long.
-CUTPROOF_DEVICE inline IterationNumbers iteration_numbers(const Pace& pace, float kdt2, int iteration) {
-  Combination combination = {};
-  if (pace.acceleration == Acceleration::chebyshev && iteration > 0) combination = chebyshev(kdt2, iteration);
-  return {combination.pull, combination.carry, lost_fraction(pace, iteration), lost_fraction(pace, iteration + 1)};
+// Of the iteration after the one with the numbers `before`. Computed once a frame: a root and powers take long.
+CUTPROOF_DEVICE inline IterationNumbers iteration_numbers(const Pace& pace, float kdt2, int iteration,
+                                                          const IterationNumbers& before) {
+  IterationNumbers numbers = {0, 0, before.lost_after, 0};
+  if (pace.acceleration == Acceleration::chebyshev && iteration > 0) {
+    const Combination combination = chebyshev(kdt2, iteration);
+    numbers.pull = combination.pull;
+    numbers.carry = combination.carry;
+  }
+  // A plain iteration takes the kept part 1 - l to 1 - s + s β (1 - l) if implicit, else to (1 - s + s β)(1 - l).
+  const Iteration now = iteration_of(pace, iteration, numbers);
+  const float lost = numbers.lost_before, s = pace.s * (1.0f - pace.volume_share);
+  const float plain = s + now.own * lost;
+  numbers.lost_after = now.combined ? now.combination(plain, lost, before.lost_before) : plain;
+  return numbers;
 }
 CUTPROOF_DEVICE inline IterationNumbers* numbers_of(const DeviceView& w, int body, int iteration) {
   return &w.iterations[int64_t{body} * (w.most_iterations + 1) + iteration];
@@ -96,19 +96,21 @@ CUTPROOF_DEVICE inline float lost_in_all(const DeviceView& w, int body, int iter
 // where the grip has put them. An iteration then changes only their push: alpha (x - d~) + beta e - M(r). M is a map,
 // like that of a carried group.
 //
-// The recurrences follow from what an iteration does with one particle (advance_particle). Its pull is G(r) - e
-// (implicit), or G(r) - e - (x - d~) (published), with G the mean goal of its group.
+// The recurrences follow from what an iteration does with one particle (advance_particle). Its goal less its base is
+// G(r) + β (x - d~ + e), with G of mean_goal(). Its pull is that less e (implicit), or less e + x - d~ (published).
 CUTPROOF_DEVICE inline void set_held_push(Pace& pace, float kdt2, int iterations) {
   float alpha = 1.0f, beta = 0.0f, earlier_alpha = 1.0f, earlier_beta = 0.0f;
+  IterationNumbers numbers = {};
   for (int j = 0; j < iterations; ++j) {
-    const Iteration now = iteration_of(pace, j, iteration_numbers(pace, kdt2, j));
+    numbers = iteration_numbers(pace, kdt2, j, numbers);
+    const Iteration now = iteration_of(pace, j, numbers);
     const float push_factor = now.implicit ? now.s : 1.0f, weight = now.combined ? now.combination.pull : 1.0f;
     const auto next = [&](float is, float was, float added) {
       const float kept_push = now.combined ? now.combination(push_factor * is, is, was) : push_factor * is;
       return kept_push + weight * added;
     };
-    const float next_alpha = next(alpha, earlier_alpha, now.implicit ? 1.0f : now.s);
-    const float next_beta = next(beta, earlier_beta, now.s);
+    const float next_alpha = next(alpha, earlier_alpha, 1.0f - now.own);
+    const float next_beta = next(beta, earlier_beta, pace.s * (1.0f - pace.volume_share));
     earlier_alpha = alpha;
     earlier_beta = beta;
     alpha = next_alpha;

@@ -108,7 +108,7 @@ CUTPROOF_DEVICE void advance_loose(Block& block, const DeviceView& w, int o, int
         const Float3 turned = {row[0].x * r.x + row[0].y * r.y + row[0].z * r.z,
                                row[1].x * r.x + row[1].y * r.y + row[1].z * r.z,
                                row[2].x * r.x + row[2].y * r.y + row[2].z * r.z};
-        sum = sum + ((center - from) + turned);
+        sum = sum + ((1.0f - pace.volume_share) * (center - from) + turned);
       }
     };
     for (int first = 0; first < kAhead; first += kAtOnce) {
@@ -118,7 +118,7 @@ CUTPROOF_DEVICE void advance_loose(Block& block, const DeviceView& w, int o, int
       for (int t = 0; t < kAtOnce; ++t) ahead[t] = holder_at(first + t);
       add(ahead, first);
     }
-    pull = (1.0f / static_cast<float>(clusters)) * sum;
+    pull = pace.volume_share * (at - from) + (1.0f / static_cast<float>(clusters)) * sum;
   }
   advance_particle<kContacts, kAccelerated, kRetarded>(w, pace, contacts, now, o, particle, from, pull);
 }

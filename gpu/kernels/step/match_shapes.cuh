@@ -2,8 +2,9 @@
 // particles (docs/design/method.md §3).
 //
 // All positions are displacements from rest, d = x - X. Then t_c - T_c = Σ w d / M. Particle i has its goal in cluster
-// c at X_i + (t_c - T_c) + (B_c - I)(X_i - T_c), with B_c = R_c unless it keeps volume. So a body at rest, or moved as
-// a whole, is reproduced exactly: all d are equal, all moments about bases are zero, and R_c is I to the last bit.
+// c at X_i + β d_i + (1 - β)(t_c - T_c) + (C_c - (1 - β) I)(X_i - T_c), with C_c = R_c where β = 0. So a body at rest,
+// or moved as a whole, is reproduced exactly: all d are equal, all moments about bases are zero, and R_c is I to the
+// last bit.
 #pragma once
 #include <cstddef>
 
@@ -167,14 +168,14 @@ CUTPROOF_DEVICE inline void place_cluster(const DeviceView& w, int s, const Clus
   // The centre makes Σ w (goal) equal Σ w x to the rounding of these two sums: the rounded T must not push the
   // cluster (docs/design/decisions.md, Momentum and the rounding of sums).
   Float3 turned = best.r * rest_moment - rest_moment;
-  Matrix3 map;  // B - I
+  Matrix3 map;  // C - (1 - β) I
   for (int k = 0; k < 9; ++k) map.m[k] = best.r.m[k] - (k % 4 == 0 ? 1.0f : 0.0f);
   if constexpr (kVolume) {
     if (rest.volume_share > 0 && rest.size > 1) {
       const float a0[3][3] = {
           {spread[0], spread[1], spread[2]}, {spread[3], spread[4], spread[5]}, {spread[6], spread[7], spread[8]}};
-      map = goal_map(rest.volume_share, a0, change, best.r);
-      turned = map * rest_moment;
+      map = map_towards(rest.volume_share, volume_maps(a0, change, best.r).pull, best.r);
+      turned = (1.0f / (1.0f - rest.volume_share)) * (map * rest_moment);
     }
   }
   const Float3 center = sums.base + rest.per_mass * (moved - rest.h * turned);

@@ -30,14 +30,18 @@ CUTPROOF_DEVICE inline float kdt2_of(const BodyConstants& body, const Pace& pace
 }
 CUTPROOF_DEVICE inline void store_numbers(const DeviceView& w, int body, const Pace& pace) {
   const float kdt2 = kdt2_of(w.body[body], pace);
-  const float lost = lost_fraction(pace, pace.iterations), lost_at_last = lost_fraction(pace, pace.last_iterations);
+  float lost = 0, lost_at_last = 0;
+  IterationNumbers numbers = {};
+  for (int iteration = 0; iteration <= pace.iterations; ++iteration) {
+    numbers = iteration_numbers(pace, kdt2, iteration, numbers);
+    *numbers_of(w, body, iteration) = numbers;
+    lost = numbers.lost_before;
+    if (iteration == pace.last_iterations) lost_at_last = lost;
+  }
   FrameParts now = first_parts();
   for (int substep = 0; substep <= pace.substeps; ++substep) {
     *parts_of(w, body, substep) = {now.place.shape, now.place.motion, now.velocity.shape, now.velocity.motion};
     now = parts_after(pace, substep + 1 < pace.substeps ? lost : lost_at_last, now);
-  }
-  for (int iteration = 0; iteration <= pace.iterations; ++iteration) {
-    *numbers_of(w, body, iteration) = iteration_numbers(pace, kdt2, iteration);
   }
 }
 
@@ -59,6 +63,7 @@ CUTPROOF_DEVICE inline Pace pace_of(const DeviceView& w, int b) {
   pace.decay = decay_by(body.damping * dt);
   pace.decay_per_dt = pace.decay / dt;
   pace.s = body.solver == Solver::implicit ? kdt2 / (1.0f + kdt2) : body.relaxation;
+  pace.volume_share = body.volume_share;
   pace.fall = (dt * pace.prediction_time) * body.gravity;
   pace.solver = body.solver;
   pace.acceleration = body.acceleration;

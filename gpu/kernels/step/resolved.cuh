@@ -71,13 +71,14 @@ CUTPROOF_DEVICE void advance_resolved(Block& block, const AnyTeam& team, const D
   Particle of_first;
   if (first < head.size) of_first = particle_at<kContacts, kAccelerated>(w, now, head.begin + first);
   block.wait_for_earlier();  // for the clusters; all other data is older
-  const Map goal = mean_goal(team, w, head, ahead.holders, pace.h, ahead.base).all(team);
+  const Map goal = mean_goal(team, w, head, ahead.holders, pace, ahead.base).all(team);
   Float4 first_at;
   team.each(head.size, [&](int k) {
     const int o = head.begin + k;
     const Particle particle = k == first ? of_first : particle_at<kContacts, kAccelerated>(w, now, o);
     const Float3 from = now.implicit ? xyz(particle.predicted) : xyz(particle.at);
-    const Float3 pull = (base - from) + goal(group.offset_at(pace, particle.node));
+    const Float3 own = pace.volume_share * (xyz(particle.at) - base);
+    const Float3 pull = (base - from) + (own + goal(group.offset_at(pace, particle.node)));
     const Float3 y =
         advance_particle<kContacts, kAccelerated, kRetarded>(w, pace, contacts, now, o, particle, from, pull);
     if (k == first) first_at = with_w(y, particle.start.w);

@@ -126,9 +126,10 @@ CUTPROOF_DEVICE float note_room(const AnyTeam& team, const DeviceView& w, const 
     start = ball_around(pace, group, with_w(origin.from(parts.motion), reach_of(parts)), 1.0f, from());
     if (contacts.move != nullptr) side = side_of_all(contacts, start);
   }
-  // An iteration adds M(r) and removes a part l of e. A ball that also contains the rest shape contains every d~ - l e.
+  // An iteration adds M(r) and removes a part l of e. A ball that also contains the rest shape contains every d~ - l e,
+  // for l from 0 to 1. Where β > 0, accelerated iterations may lose up to 2 e.
   Ball ball = ball_around(pace, group, with_w(xyz(base), own_reach), 1.0f, to);
-  ball.radius = fmaxf(ball.radius, pace.h * group.head.radius);
+  ball.radius = fmaxf(ball.radius, pace.h * group.head.radius + (pace.volume_share > 0 ? base.w : 0.0f));
   const float room = room_of_prediction<kRetarded>(pace, contacts, start, ball, side);
   if (team.leads()) {
     w.group_base[g] = base;

@@ -121,7 +121,7 @@ TEST(Frame, RunsItsPiecesSideBySideInAnyOrder) {
       ASSERT_EQ(in_turns.staging.counters.front().groups, counters.groups);
     }
   }
-  EXPECT_GT(growing, 20);
+  EXPECT_GT(growing, 12);
   EXPECT_GT(merging, 20);
   EXPECT_GT(first_skins, 20);
 }

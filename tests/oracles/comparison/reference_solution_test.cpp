@@ -326,7 +326,7 @@ TEST(ReferenceSolution, TellsAMinimumFromASaddle) {
     const SubstepProblem problem(scene.setup, scene.state);
     ContactStage contacts(problem);
     std::vector<Vec3> center = {start};
-    const ContactStage::Rest rest = contacts.rest(scene.state.clusters.rotation, center);
+    const ContactStage::Rest rest = contacts.rest(poses_at(problem, {start}, scene.state.clusters.rotation), center);
     ASSERT_TRUE(rest.found);
     EXPECT_LT(norm(rest.x[0] - start), 1e-12);
     EXPECT_EQ(contacts.is_strict_minimum(rest), !below);
