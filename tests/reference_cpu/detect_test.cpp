@@ -278,13 +278,14 @@ TEST(DetectGeometric, RemovesWhatIsWithinReachOfTheSweptMidSurface) {
     detect(setup, state);
     const double reach = std::max(thickness, 1.0) / 2;
     for (std::size_t i = 0; i < state.x.size(); ++i) {
-      // Between two of 40 places the plate moves by less than 0.2 h.
-      const double about = sampled_distance(setup.blade, from, to, state.x[i], 40);
-      const double distance = about > reach + 1 ? about : sampled_distance(setup.blade, from, to, state.x[i], 4000);
       // The sampled way is off by at most half its step. What is within reach always goes; where the blade turns, so
       // may what is farther by twice the slack of the sweep's pieces, 0.05 h: once for the slack itself, once for how
       // far a piece is from the true sweep.
       const double band = 0.002, slack = b == a ? 0 : 2 * 0.05;
+      // Between two of 40 places the plate moves by less than 0.2 h: they decide what is not near the reach.
+      const double about = sampled_distance(setup.blade, from, to, state.x[i], 40);
+      const bool is_near = about >= reach - band && about <= reach + band + slack + 0.2;
+      const double distance = is_near ? sampled_distance(setup.blade, from, to, state.x[i], 4000) : about;
       if (distance >= reach - band && distance <= reach + band + slack) continue;
       EXPECT_EQ(state.alive[i] == 0, distance < reach) << "trial " << trial << ", particle " << i << ", " << distance;
       ++(state.alive[i] ? kept : removed);
