@@ -233,6 +233,7 @@ TEST_F(Program, CallsIsolationAFailureUnlessTheSceneExpectsIt) {
   std::ifstream file(scene("irregular_sampled"));
   json foreign = json::parse(file);
   foreign["expect"].erase("isolated_clusters");
+  foreign["frame"] = {{"length", 0.016}, {"count", 30}};  // the first is isolated in frame 24
   write("isolated.json", foreign.dump());
   const Outcome outcome = cutproof("run isolated.json --check topology");
   EXPECT_EQ(outcome.status, 1) << outcome.output;
