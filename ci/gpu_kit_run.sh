@@ -115,6 +115,8 @@ for part in $parts; do
         # then ends no kernel during the launch of another.
         try "sanitizer_$tool" compute-sanitizer --tool "$tool" --error-exitcode 9 cutproof fuzz \
           --backend gpu-eager --threads 1 --cases "${CUTPROOF_SANITIZER_CASES:-128}" --save "$results"
+        try "sanitizer_${tool}_moving" compute-sanitizer --tool "$tool" --error-exitcode 9 cutproof fuzz \
+          --backend gpu-eager --threads 1 --dynamics --cases 16 --save "$results"
         try "sanitizer_${tool}_step" compute-sanitizer --tool "$tool" --error-exitcode 9 cutproof run \
           fixtures/scenes/small_block.json --backend gpu-eager
         try "sanitizer_${tool}_retarded" compute-sanitizer --tool "$tool" --error-exitcode 9 cutproof run \
