@@ -180,6 +180,7 @@ VolumeTarget volume_target(const Mat3& a, const Mat3& rest_moment, const Mat3& r
 
 double VolumeTarget::rounding(double off, double sums, double u) const {
   const double of_moments = (off + sums * stretch) * thinness;
+  // V - F errs by the error of V, and by that of F itself.
   const double found = (growth + 1) * (of_moments + kRounds * u * size);
   // Nearer to a tie a backend chooses.
   const bool is_sure = is_flat || (gap > degenerate_rounds(u) * u && lead > 4 * (of_moments + kRounds * u * size));

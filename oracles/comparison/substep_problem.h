@@ -64,8 +64,8 @@ struct Poses {
 // The best where elasticity acts when particles are at x. Where many rotations are, the one nearest to `previous`.
 Poses poses_at(const SubstepProblem& problem, const std::vector<Vec3>& x, const std::vector<Mat3>& previous);
 
-// [n] g_i less the mean of t_c over a particle's clusters: the mean of C_c (X_i − T_c) + β (y_i − t_c). A minimum of E
-// with this held fixed lowers E: what is left out bounds it from above.
+// [n] g_i less the mean of t_c over a particle's clusters: the mean of C_c (X_i − T_c) + β (y_i − t_c). With these
+// held fixed, a function bounds E from above and meets it at y. So its minimum has less E.
 std::vector<Vec3> turned_offsets(const SubstepProblem& problem, const Poses& poses);
 
 // One plain iteration from x, whose poses are given.

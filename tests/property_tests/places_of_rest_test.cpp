@@ -71,7 +71,8 @@ TEST(PlacesOfRest, AreThoseOfPlainIterations) {
 // another one, which is deeper. Neither is passed off as the other.
 TEST(PlacesOfRest, AnotherOneIsSaidToBeAnotherOne) {
   Case drawn = draw_moving_case(32, 40);
-  drawn.retardation = 0;  // found so; with what it draws the two ways end in one place
+  // Found so: with the retardation and the clusters that are drawn, both ways end in one place.
+  drawn.retardation = 0;
   drawn.clusters = ClusterKind::foreign;
   const Instance instance = instance_of(drawn);
   const auto judged = reference::make_backend();
